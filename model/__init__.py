@@ -7,6 +7,7 @@ machine        frozen definitions: spindle, section, points, condition; bearings
 material       frozen definitions: laws over temperature, materials
 structure      frozen definitions: bodies, and joints between them
 shaft          flexible shafts as they are drawn, and the nodes a beam model gives them
+changed        frozen definitions that are made anew at every operating point, quickly
 carrier        which turning part an unbalance or a radial load acts on
 span           the temperatures at which a spindle can be computed
 built/         how a built spindle differs from its drawing: toleranced parameters, imperfections

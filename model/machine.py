@@ -6,11 +6,11 @@ and a structure is stands in `model.bearing.definitions`, `model.material` and `
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -204,7 +204,16 @@ class Spindle:
         every: list[Bearing | LinearBearing | RollerBearing] = [*self.bearings, *self.linear_bearings, *self.roller_bearings]
         return tuple(sorted(every, key=lambda b: b.z))
 
-    @property
+    def __getstate__(self) -> dict:
+        """Without what was worked out: it is on its way to another process."""
+        return {k: v for k, v in self.__dict__.items() if k != "_known"}
+
+    @cached_property
+    def _known(self) -> dict[Callable, Any]:
+        """Answers of functions that are `kept`."""
+        return {}
+
+    @cached_property
     def ringed(self) -> tuple[Bearing | RollerBearing, ...]:
         """The bearings whose rings are regions of the section: ball rows, then roller bearings."""
         return (*self.bearings, *(b for b in self.roller_bearings if b.inner_ring))
@@ -282,6 +291,22 @@ class Spindle:
 
     def point(self, node: int) -> Point:
         return next(p for p in self.points if p.node == node)
+
+
+T = TypeVar("T")
+
+
+def kept(worked_out: Callable[[Spindle], T]) -> Callable[[Spindle], T]:
+    """A function of a drawing alone, asked at many conditions: its answer stays with the drawing."""
+
+    @wraps(worked_out)
+    def of(spindle: Spindle) -> T:
+        if worked_out not in spindle._known:
+            spindle._known[worked_out] = worked_out(spindle)
+        found: T = spindle._known[worked_out]
+        return found
+
+    return of
 
 
 @dataclass(frozen=True)

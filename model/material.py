@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from math import log10
 
 import numpy as np
@@ -52,7 +54,8 @@ class Law(Entries):
             return self.value[0] * (stop - start)
         low, high = sorted((start, stop))
         knots = [low, *[t for t in self.temperature if low < t < high], high]
-        area = float(np.trapezoid([self(t) for t in knots], knots))
+        value = [self(t) for t in knots]
+        area = sum((b - a) * (u + v) / 2 for (a, b), (u, v) in zip(pairwise(knots), pairwise(value), strict=True))
         return area if stop >= start else -area
 
 
@@ -63,14 +66,19 @@ LEAST_VISCOSITY = 0.35e-6  # m2/s; log10 log10 (nu + 0.7 mm2/s) ends at 0.3 mm2/
 class Viscosity(Entries):
     """Kinematic viscosity (m2/s) of an oil, at least `LEAST_VISCOSITY`: between its entries log10 log10 (nu + 0.7) is linear in log10 T, nu in mm2/s and T in K (ASTM D341)."""
 
+    @cached_property
+    def _straight(self) -> list[tuple[float, float]]:
+        """Entries as they lie on straight lines."""
+        return [(log10(t + 273.15), log10(log10(1e6 * v + 0.7))) for t, v in zip(self.temperature, self.value, strict=True)]
+
     def __call__(self, temperature: float) -> float:
         if len(self.value) == 1:
             return self.value[0]
         if not self.temperature[0] - BEYOND <= temperature <= self.temperature[-1] + BEYOND:
             self.check(temperature)
         k = self._after(temperature)
-        start, end, asked = (log10(t + 273.15) for t in (*self.temperature[k - 1 : k + 1], temperature))
-        first, last = (log10(log10(1e6 * v + 0.7)) for v in self.value[k - 1 : k + 1])
+        (start, first), (end, last) = self._straight[k - 1 : k + 1]
+        asked = log10(temperature + 273.15)
         return 1e-6 * (float(10 ** 10 ** (first + (asked - start) / (end - start) * (last - first))) - 0.7)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from thermospindle.model.machine import RingMotion, Spindle
 from thermospindle.thermal.elastic import Race, Response, Solid
-from thermospindle.thermal.influence import TOLERANCE, Influence, elasticity, gains, influence, raceways
+from thermospindle.thermal.influence import TOLERANCE, Influence, elasticity, every_race, gains, influence
 from thermospindle.thermal.temperature import TemperatureField, region_temperatures, thermal_strain
 
 __all__ = ["DeformedSection", "Influence", "expand", "field", "influence"]
@@ -34,8 +34,8 @@ def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERA
         for response in influence(spindle, tolerance, means).responses.values():
             strains = _strain_field(spindle, Solid(response.section, elasticity(spindle, means)), temperature)
             moves |= _by_race(response.races, np.einsum("ieq,eq->i", response.density, strains))
-    elif not any((free := dict(zip(means, _region_strains(spindle, list(means), means), strict=True))).values()):
-        moves = {race: (0.0, 0.0) for b in spindle.ringed for race in raceways(spindle, b)}
+    elif not any((free := _region_strains(spindle, means)).values()):
+        moves = {race: (0.0, 0.0) for pair in every_race(spindle).values() for race in pair}
     else:
         for gain in gains(spindle, tolerance, means):
             moves |= _by_race(gain.races, gain.value @ np.array([free[region] for region in gain.regions]))
@@ -44,17 +44,16 @@ def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERA
 
 def _by_race(races: Sequence[Race], motion: np.ndarray) -> dict[Race, tuple[float, float]]:
     """Motions (2 races,) as (r, z) of every race."""
-    return {race: (float(r), float(z)) for race, (r, z) in zip(races, motion.reshape(-1, 2), strict=True)}
+    return {race: (r, z) for race, (r, z) in zip(races, motion.reshape(-1, 2).tolist(), strict=True)}
 
 
 def ring_motions(spindle: Spindle, means: Mapping[str, float], moves: Mapping[Race, tuple[float, float]]) -> dict[str, RingMotion]:
     """Motion of every bearing's rings from what their races move by (r, z in m) and the region means (C)."""
-    result = {}
+    result, races, reference = {}, every_race(spindle), spindle.reference_temperature
     for b in spindle.ringed:
-        inner_race, outer_race = raceways(spindle, b)
+        inner_race, outer_race = races[b.name]
         inner, outer = means[b.inner_ring], means[b.outer_ring]
         ring, ball = spindle.materials[b.ring_material], spindle.materials[b.ball_material]
-        reference = spindle.reference_temperature
         result[b.name] = RingMotion(
             *moves[inner_race],
             *moves[outer_race],
@@ -101,7 +100,8 @@ def _deformed_by_regions(spindle: Spindle, response: Response, means: Mapping[st
     nodal = np.empty(solid.scalar.N)
     for name in response.section.regions:
         nodal[solid.scalar.element_dofs[:, response.section.elements(name)]] = means[name]
-    return _drawing(solid, np.tensordot(_region_strains(spindle, response.section.regions, means), response.shape, axes=1), nodal)
+    free = _region_strains(spindle, means)
+    return _drawing(solid, np.tensordot([free[name] for name in response.section.regions], response.shape, axes=1), nodal)
 
 
 def _drawing(solid: Solid, displacement: np.ndarray, temperature: np.ndarray) -> DeformedSection:
@@ -112,11 +112,9 @@ def _drawing(solid: Solid, displacement: np.ndarray, temperature: np.ndarray) ->
     return DeformedSection(section.regions, solid.nodes, triangles, displacement, temperature, owner)
 
 
-def _region_strains(spindle: Spindle, regions: Sequence[str], means: Mapping[str, float]) -> np.ndarray:
-    """Free thermal strain (regions,) of a part's regions."""
-    materials = [spindle.materials[spindle.region(name).material] for name in regions]
-    reference = spindle.reference_temperature
-    return np.array([m.thermal_strain(means[n], reference) for n, m in zip(regions, materials, strict=True)])
+def _region_strains(spindle: Spindle, means: Mapping[str, float]) -> dict[str, float]:
+    """Free thermal strain of every region, by its name."""
+    return {g.name: spindle.materials[g.material].thermal_strain(means[g.name], spindle.reference_temperature) for g in spindle.regions}
 
 
 def _strain_field(spindle: Spindle, solid: Solid, temperature: TemperatureField) -> np.ndarray:

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
-from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
+from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle, kept
 from thermospindle.model.material import Law
 from thermospindle.thermal import store
 from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid
@@ -92,9 +92,7 @@ class Gain:
 
 def gains(spindle: Spindle, tolerance: float, temperatures: Mapping[str, float]) -> tuple[Gain, ...]:
     """The gains of `influence` at temperatures (C, by region), part by part, without what only fields of temperature need."""
-    made_of = tuple((name, m.youngs_modulus, m.poisson_ratio) for name, m in spindle.materials.items())
-    of = _Of(spindle.regions, made_of, spindle.ringed, spindle.reference_temperature, spindle)
-    return tuple(gain_at(temperatures) for gain_at in _gains(of, tolerance))
+    return tuple(gain_at(temperatures) for gain_at in _gains(_of(spindle), tolerance))
 
 
 @dataclass(frozen=True)
@@ -103,9 +101,22 @@ class _Of:
 
     regions: tuple[Region, ...]
     materials: tuple[tuple[str, Law, float], ...]
-    ringed: tuple[Bearing | RollerBearing, ...]
+    races: tuple[tuple[Race, Race], ...]
     reference_temperature: float
     spindle: Spindle = field(compare=False)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.regions, self.materials, self.races, self.reference_temperature))
+
+
+@kept
+def _of(spindle: Spindle) -> _Of:
+    made_of = tuple((name, m.youngs_modulus, m.poisson_ratio) for name, m in spindle.materials.items())
+    return _Of(spindle.regions, made_of, tuple(every_race(spindle).values()), spindle.reference_temperature, spindle)
 
 
 @lru_cache(maxsize=64)
@@ -198,8 +209,14 @@ def elasticity(spindle: Spindle, temperatures: Mapping[str, float] | None = None
 
 def races(spindle: Spindle, part: str) -> tuple[Race, ...]:
     """The raceway faces on `part`: the outside of inner rings, the bore of outer rings; lower bearing first."""
-    faces = [face for b in spindle.ringed for face in raceways(spindle, b)]
+    faces = [face for pair in every_race(spindle).values() for face in pair]
     return tuple(face for face in faces if spindle.region(face.ring).part == part)
+
+
+@kept
+def every_race(spindle: Spindle) -> dict[str, tuple[Race, Race]]:
+    """The raceway faces of every bearing with rings, by its name."""
+    return {b.name: raceways(spindle, b) for b in spindle.ringed}
 
 
 def raceways(spindle: Spindle, bearing: Bearing | RollerBearing) -> tuple[Race, Race]:

@@ -17,7 +17,9 @@ class Latest(Generic[T]):
 
     def of(self, key: Hashable, worked_out: Callable[[], T]) -> T:
         """What is known by a key, or is `worked_out`; what was not asked for the longest gives way to it."""
-        found = self._known.pop(key) if key in self._known else worked_out()
+        found = self._known.pop(key, None)
+        if found is None:
+            found = worked_out()
         self._known[key] = found
         if len(self._known) > self._most:
             del self._known[next(iter(self._known))]

@@ -24,6 +24,7 @@ from thermospindle.diagnosis.parameters.nuisance import Nuisance, Resonance, Une
 from thermospindle.diagnosis.parameters.numbers import Discrepancies, Numbers
 from thermospindle.diagnosis.parameters.reference import ReferenceModes, Turned
 from thermospindle.model.built.tolerance import Toleranced
+from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
@@ -69,20 +70,22 @@ class CampaignModel:
     # ------------------------------------------------------------ the spindle at nuisance values
 
     def _built(self, t: int, x: Array) -> Spindle:
-        t, coefficients = self._like[t], self.numbers.coefficients
+        t = self._like[t]
 
         def built() -> Spindle:
             spindle = self.scenes[t]
             for parameter, nuisance, value in zip(self.build, self.parameters, x, strict=False):
                 if value:
                     spindle = parameter.apply(spindle, nuisance.at(value))
-            for i in coefficients:
+            for i in self.numbers.coefficients:
                 if x[i]:
                     material = spindle.materials[spindle.used_materials[self.parameters[i].index]]
                     spindle = with_material(spindle, expanding(material, float(x[i]) * self.sd[i]))
+            for i in self.numbers.flung:
+                spindle = replace(spindle, ball_inertia=max(spindle.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
             return spindle
 
-        return self._spindles.of((t, x[: len(self.build)].tobytes(), x[coefficients].tobytes()), built)
+        return self._spindles.of((t, x[self.numbers.drawn].tobytes()), built)
 
     @cached_property
     def _spindles(self) -> Latest[Spindle]:
@@ -110,12 +113,12 @@ class CampaignModel:
 
     def operating(self, t: int, x: Array, effects: Applied) -> OperatingPoint:
         """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again, nor rings that settle alike."""
-        effects, own = within_limits(effects), self.numbers
-        little = tuple(x[of].tobytes() for of in (own.apart, own.balls[t], own.uneven))
-        at = (t, x[: len(self.build)].tobytes(), float(x[own.temperature[t]]), *(x[of].tobytes() for of in (own.expansion, own.coefficients, own.flung)))
+        effects = within_limits(effects)
+        at, little = (t, x[self.numbers.settling[t]].tobytes()), x[self.numbers.little[t]].tobytes()
 
         def worked_out() -> OperatingPoint:
-            every = [*self._otherwise_than_drawn(t, x), *self.present, *effects]
+            own = undrawn(self.numbers, t, x, [b.name for b in self.spindle.all_bearings], self.unevennesses, self._undrawn)
+            every = [*own, *self.present, *effects]
             found = acted_on(self._with_settled_rings(t, x, every, (at, _asking(effects, SETTLING))), every)
             found.chain  # noqa: B018 - worked out here, so that errors come here
             return found
@@ -130,12 +133,9 @@ class CampaignModel:
         """The rings of test `t` in equilibrium under all that acts."""
 
         def settled() -> tuple[OperatingPoint, Applied]:
-            own = self.numbers
-            condition, warmer = self.tests[t].condition, float(x[own.temperature[t]]) * self.parameters[own.temperature[t]].sd
-            built = self._built(t, x)
-            for i in own.flung:
-                built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
-            return equilibrium(built, replace(condition, temperature=condition.temperature + warmer), every), every
+            condition, i = self.tests[t].condition, self.numbers.temperature[t]
+            warmer = float(x[i]) * self.parameters[i].sd
+            return equilibrium(self._built(t, x), changed(condition, temperature=condition.temperature + warmer), every), every
 
         return self._equilibria.of(key, settled)[0]
 
@@ -144,14 +144,9 @@ class CampaignModel:
         """With the effects, which their keys tell apart by where they are in memory: as long as they are kept no other comes there."""
         return Latest(KEPT * len(self.tests))
 
-    def _otherwise_than_drawn(self, t: int, x: Array) -> list[tuple[Effect, Values]]:
-        own = self.numbers
-        key = t, *(x[of].tobytes() for of in (own.expansion, own.uneven, own.balls[t], own.apart))
-        return self._undrawn.of(key, lambda: undrawn(own, t, x, [b.name for b in self.spindle.all_bearings], self.unevennesses))
-
     @cached_property
-    def _undrawn(self) -> Latest[list[tuple[Effect, Values]]]:
-        return Latest(KEPT * len(self.tests))
+    def _undrawn(self) -> Latest[tuple[Effect, Values]]:
+        return Latest(4 * KEPT * len(self.tests))
 
     @cached_property
     def by_condition(self) -> Array:
@@ -203,8 +198,9 @@ class CampaignModel:
         if not (len(gain) and (x[number].any() or (gain != 1.0).any())):
             return chain
         missed = np.bincount(which, x[number] * self.sd[number], 2 * (of.max() + 1)).reshape(-1, 2)  # of every hammer, either way
-        rows = chain.reference_rows + np.einsum("rw,wrn->rn", missed[of], aside(point))
-        return replace(chain, reference_rows=gain[:, None] * rows)
+        one, other = aside(point)
+        rows = chain.reference_rows + missed[of, :1] * one + missed[of, 1:] * other
+        return changed(chain, reference_rows=gain[:, None] * rows)
 
     def hammer_gain(self, t: int, x: Array) -> Array:
         """Gain (n_ref,) of the hammer of each column of test `t`."""
@@ -213,7 +209,8 @@ class CampaignModel:
     def _otherwise_heavy(self, x: Array, dofs: Dofs) -> tuple[Array, Array]:
         """What bodies that have their mass otherwise than drawn add to M and, per rad/s, to G (n, n)."""
         mass, gyroscopic = self.heavier(dofs)
-        return np.tensordot(x[self.numbers.masses], mass, 1), np.tensordot(x[self.numbers.masses], gyroscopic, 1)
+        n, own = len(dofs), x[self.numbers.masses]
+        return (own @ mass.reshape(-1, n * n)).reshape(n, n), (own @ gyroscopic.reshape(-1, n * n)).reshape(n, n)
 
     def heavier(self, dofs: Dofs) -> tuple[Array, Array]:
         """What a standard deviation of each way in which bodies may have their mass otherwise adds to M and, per rad/s, to G (k, n, n)."""
@@ -325,7 +322,7 @@ def _modal(discrepancies: Discrepancies, x: Array, modes: int) -> Array:
 
 def _asking(effects: Applied, hooks: Sequence[str]) -> tuple:
     """What tells those of the effects that have one of these hooks from others."""
-    return tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in hooks))
+    return tuple((id(e), *v.values()) for e, v in effects if not e.hooks.isdisjoint(hooks))
 
 
 def within_limits(effects: Applied) -> list[tuple[Effect, Values]]:

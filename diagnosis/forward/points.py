@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
 
+from thermospindle.diagnosis.forward.latest import Latest
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.nuisance import DIRECTIONS, RANGE_K, Nuisance, Unevenness
 from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.changed import changed
 from thermospindle.model.machine import Condition, Point, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Layout, RotorBase, row_of
 from thermospindle.model.types import Array, Integers
@@ -27,7 +28,7 @@ def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint
     """The same point under another list of effects that differs in the measuring chain alone; its chain and matrices are kept."""
     if tuple(effects) == point.effects:
         return point
-    other = replace(point, effects=tuple(effects))
+    other = changed(point, effects=tuple(effects))
     other.__dict__["chain"] = point.chain
     if "_bare" in point.__dict__:
         other.__dict__["_bare"] = point.__dict__["_bare"]
@@ -46,27 +47,31 @@ def _aside(layout: Layout, aimed: tuple[Point, ...]) -> Array:
     return found
 
 
-def undrawn(numbers: Numbers, t: int, x: Array, bearings: Sequence[str], joints: Sequence[Unevenness]) -> list[tuple[Effect, Values]]:
-    """What `bearings`, balls, `joints` and rings are in test `t`, at nuisance values x (P,), that no drawing has, as effects that act before all others."""
-    found = []
+Told = Sequence[tuple[Nuisance, float]]
+"""Parameters with how much they are, in their own units."""
 
-    def told(of: Integers) -> list[tuple[Nuisance, float]]:
-        """By how much, in their own units."""
-        return [(p, float(x[i]) * p.sd) for i in of for p in [numbers.parameters[i]]]
 
-    if x[numbers.expansion].any():
-        found.append(stretched(*(1 + value for _, value in told(numbers.expansion))))
-    if x[numbers.uneven].any():
-        found.append(uneven([(joints[p.index], value) for p, value in told(numbers.uneven)]))
-    if x[numbers.balls[t]].any():
-        balls = told(numbers.balls[t])
-        shares = {p.index: value for p, value in balls if p.kind == kinds_of.BALLS}
-        warmer = sum(value for p, value in balls if p.kind == kinds_of.CHANGE and p.test is None)
-        own = {p.index: value for p, value in balls if p.kind == kinds_of.CHANGE and p.test == t}
-        found.append(otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0))))
-    if x[numbers.apart].any():
-        found.append(apart(*({bearings[p.index]: value for p, value in told(numbers.apart) if p.kind == kind} for kind in kinds_of.APART)))
-    return found
+def undrawn(numbers: Numbers, t: int, x: Array, bearings: Sequence[str], joints: Sequence[Unevenness], known: Latest[tuple[Effect, Values]]) -> list[tuple[Effect, Values]]:
+    """What `bearings`, balls, `joints` and rings are in test `t`, at nuisance values x (P,), that no drawing has, as effects that act before all others; `known` keeps these."""
+    ways: tuple[tuple[Integers, Callable[[Told], tuple[Effect, Values]]], ...] = (
+        (numbers.expansion, lambda told: stretched(*(1 + value for _, value in told))),
+        (numbers.uneven, lambda told: uneven([(joints[p.index], value) for p, value in told])),
+        (numbers.balls[t], _otherwise),
+        (numbers.apart, lambda told: apart(*({bearings[p.index]: value for p, value in told if p.kind == kind} for kind in kinds_of.APART))),
+    )
+
+    def acting(of: Integers, as_effect: Callable[[Told], tuple[Effect, Values]]) -> tuple[Effect, Values]:
+        return known.of((of.tobytes(), x[of].tobytes()), lambda: as_effect([(p, float(x[i]) * p.sd) for i in of for p in [numbers.parameters[i]]]))
+
+    return [acting(of, as_effect) for of, as_effect in ways if x[of].any()]
+
+
+def _otherwise(told: Told) -> tuple[Effect, Values]:
+    """Of balls by what they are in all tests, and in one."""
+    shares = {p.index: value for p, value in told if p.kind == kinds_of.BALLS}
+    warmer = sum(value for p, value in told if p.kind == kinds_of.CHANGE and p.test is None)
+    own = {p.index: value for p, value in told if p.kind == kinds_of.CHANGE and p.test is not None}
+    return otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0)))
 
 
 def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:
@@ -74,7 +79,7 @@ def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Valu
     factors = {"inner_r": radial, "outer_r": radial, "inner_z": axial, "outer_z": axial, "inner_strain": grooves, "outer_strain": grooves}
 
     def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
-        return {b: replace(m, **{k: f * getattr(m, k) for k, f in factors.items()}) for b, m in by_bearing.items()}
+        return {b: changed(m, **{k: f * getattr(m, k) for k, f in factors.items()}) for b, m in by_bearing.items()}
 
     return Effect("expansion", "", "", (), "", (), "", motions=motions), {}
 
@@ -87,9 +92,9 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
         return stiffer.get(name, 1.0), stiffer.get(name, 1.0) * lossier.get(name, 1.0)
 
     def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
-        bearings = tuple(replace(b, stiffness=k * b.stiffness, damping=c * b.damping) for b in state.bearings for k, c in [of(b.name)])
-        linear = tuple(replace(b, stiffness=k * b.stiffness, damping=c * b.damping) for b in state.linear for k, c in [of(b.name)])
-        return replace(state, bearings=bearings, linear=linear)
+        bearings = tuple(changed(b, stiffness=k * b.stiffness, damping=c * b.damping) for b in state.bearings for k, c in [of(b.name)])
+        linear = tuple(changed(b, stiffness=k * b.stiffness, damping=c * b.damping) for b in state.linear for k, c in [of(b.name)])
+        return changed(state, bearings=bearings, linear=linear)
 
     return Effect("apart", "", "", (), "", (), "", pair=pair), {}
 
@@ -104,7 +109,7 @@ def otherwise(shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float
 
     def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
         factor = square * max(1 + warmer * (condition.temperature - spindle.reference_temperature) / RANGE_K, 0.0)
-        return replace(state, bearings=tuple(replace(b, stiffness=factor * b.stiffness, damping=factor * b.damping) for b in state.bearings))
+        return changed(state, bearings=tuple(changed(b, stiffness=factor * b.stiffness, damping=factor * b.damping) for b in state.bearings))
 
     return Effect("otherwise", "", "", (), "", (), "", pair=pair), {}
 
@@ -124,6 +129,6 @@ def uneven(shares: Sequence[tuple[Unevenness, float]]) -> tuple[Effect, Values]:
 
     def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
         turned = ((e, by_joint.get(e.name)) for e in chain.elements)
-        return replace(chain, elements=tuple(e if s is None else replace(e, stiffness=s @ e.stiffness @ s, damping=s @ e.damping @ s) for e, s in turned))
+        return changed(chain, elements=tuple(e if s is None else changed(e, stiffness=s @ e.stiffness @ s, damping=s @ e.damping @ s) for e, s in turned))
 
     return Effect("uneven", "", "", (), "", (), "", chain=chain), {}

@@ -43,6 +43,21 @@ class Numbers:
         return test, index, mode
 
     @cached_property
+    def drawn(self) -> Integers:
+        """Numbers of the parameters of the drawing: build tolerances, coefficients of expansion, the balls' inertia loads."""
+        return self._of(kinds_of.BUILD, kinds_of.COEFFICIENT, kinds_of.FLUNG)
+
+    @cached_property
+    def settling(self) -> list[Integers]:
+        """For every test the numbers of all parameters on which it depends where its rings settle."""
+        return [np.array([*self.drawn, *self.expansion, temperature], int) for temperature in self.temperature]
+
+    @cached_property
+    def little(self) -> list[Integers]:
+        """For every test the numbers of those by which its bearings and joints differ where rings have settled."""
+        return [np.concatenate([self.apart, balls, self.uneven]) for balls in self.balls]
+
+    @cached_property
     def expansion(self) -> Integers:
         """Numbers of the parameters of ring expansion."""
         return self._of(kinds_of.EXPANSION)

@@ -32,10 +32,15 @@ class ReferenceModes:
 
     def turned(self, stated: Array) -> Turned:
         """The error of the stiffness over the modal matrix (m, m) where so much is `stated` of each pair."""
+        return Turned(stated, self.gaps, self.seen)
+
+    @cached_property
+    def gaps(self) -> Array:
+        """1 / (w_i^2 - w_j^2) (m, m) of modes that are `FAR_APART`, else zero."""
         square = self.omega**2
         difference = square[:, None] - square
         apart = np.abs(difference) > FAR_APART * np.minimum(square[:, None], square)
-        return Turned(stated, np.where(apart, 1 / np.where(apart, difference, 1.0), 0.0), self.seen)
+        return np.where(apart, 1 / np.where(apart, difference, 1.0), 0.0)
 
     def over(self, dofs: Sequence[tuple[str, str]]) -> Array:
         """M f over other dofs: zero for those that the reference has not; read only."""

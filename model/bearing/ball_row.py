@@ -34,11 +34,10 @@ from thermospindle.model.bearing.heavy_ball import (
     settled,
 )
 from thermospindle.model.bearing.hertz import in_series
+from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
-Centres = dict["BallRow", Vector]
-"""Where the balls of rows with centred rings settled last."""
 ROUNDS, STANDING = 20, 1e-12  # of the cage's speed, and what of it is no change
 ROUNDED = 4 * 2.0**-52
 """Of a distance of groove centres, what rounding may change of the two that a ball's centre divides it into."""
@@ -69,9 +68,20 @@ class BallRow:
         """Load-deflection constant of both contacts in series (N/m^1.5)."""
         return in_series(self.inner_constant, self.outer_constant)
 
-    @property
+    @cached_property
     def unloaded_distance(self) -> float:
         return self.inner_length + self.outer_length
+
+    @property
+    def heavy(self) -> bool:
+        """Whether its balls have inertia of which one asks."""
+        return self.inertia is not None and self.inertia.share != 0.0
+
+    @cached_property
+    def ball(self) -> HeavyBall:
+        """One of its balls, of those with inertia."""
+        assert self.inertia is not None
+        return HeavyBall(self.inner_length, self.outer_length, self.inner_constant, self.outer_constant, self.inertia)
 
     @property
     def azimuths(self) -> Array:
@@ -102,11 +112,12 @@ class RowForce:
 
 def kinematics(row: BallRow) -> Array:
     """Rows (balls, 2, 5) that take the outer ring's displacement to (u_r, u_z) at each ball; read only."""
-    return _kinematics(row.balls, row.arm)
+    return kinematics_of(row.balls, row.arm)
 
 
 @lru_cache(maxsize=1024)
-def _kinematics(balls: int, arm: float) -> Array:
+def kinematics_of(balls: int, arm: float) -> Array:
+    """The same from what it depends on."""
     c, s = np.cos(azimuths(balls)), np.sin(azimuths(balls))
     o, i = np.zeros_like(c), np.ones_like(c)
     rows = np.stack([np.stack([c, s, o, o, o], -1), np.stack([o, o, i, arm * s, -arm * c], -1)], 1)
@@ -132,7 +143,7 @@ def respond(row: BallRow, displacement: Array | None = None, centre: Vector | No
     """
     u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
     line = centre_line(row, u)
-    local, cage = _with_inertia(row, line, centre) if _heavy(row) else (_massless(row, line), None)
+    local, cage = _with_inertia(row, line, centre) if row.heavy else (_massless(row, line), None)
     force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
     b = kinematics(row)
     flat = b.reshape(-1, 5)
@@ -148,34 +159,6 @@ def respond(row: BallRow, displacement: Array | None = None, centre: Vector | No
         outer_angle,
         deformation,
     )
-
-
-def centred_axial_force(row: BallRow, movement: float = 0.0, centres: Centres | None = None) -> float:
-    """Axial force (N) needed on the outer ring of a row with centred rings when it has moved by `movement` (m), as `respond` has it."""
-    return centred_axial(row, movement, centres)[0]
-
-
-def centred_axial(row: BallRow, movement: float, centres: Centres | None = None) -> tuple[float, float]:
-    """`centred_axial_force` and its derivative by the movement (N/m).
-
-    Of rows that are asked at many places near each other `centres` keeps where their balls have settled.
-    """
-    axial = row.axial + movement
-    if _heavy(row):
-        centres = {} if centres is None else centres
-        line = -row.radial, axial
-        found = settled(_ball(row), line, *_tolerances(row, [line]), centres.get(row))  # all balls roll alike, and the cage with them
-        centres[row] = found.centre
-        return row.balls * found.on_outer[1], row.balls * found.stiffness()[3]
-    length = hypot(row.radial, axial)
-    deformation = max(length - row.unloaded_distance, 0.0)
-    root, sine = row.balls * row.constant * sqrt(deformation), axial / length
-    force = root * deformation
-    return force * sine, 1.5 * root * sine**2 + force / length * (1 - sine**2)
-
-
-def _heavy(row: BallRow) -> bool:
-    return row.inertia is not None and row.inertia.share != 0.0
 
 
 def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
@@ -203,7 +186,7 @@ class Cage:
 def _with_inertia(row: BallRow, line: Array, centre: Vector | None) -> tuple[tuple[Array, ...], Cage | None]:
     """As `_massless` at the speed of the cage, with the centre of every ball an unknown of its own; and what the cage does as rings move."""
     lines = [(r, z) for r, z in line.tolist()]
-    _, found = _at_one_speed(row, lines, centre)
+    _, found = at_one_speed(row, lines, centre)
     balances, each = zip(*(found[at] for at in lines), strict=True)
     stiffness = {at: np.reshape(b.stiffness(), (2, 2)) for at, (b, _) in found.items()}
     told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
@@ -217,54 +200,49 @@ def _with_inertia(row: BallRow, line: Array, centre: Vector | None) -> tuple[tup
 
 def with_cage_held(row: BallRow) -> BallRow:
     """The row whose cage keeps the speed that it has with centred rings, whatever balls and rings do."""
+    if row.inertia is None or not row.heavy:
+        return row
     line = -row.radial, row.axial
-    return _held(row, _at_one_speed(row, [line], None)[0]) if _heavy(row) else row
+    return replace(row, inertia=replace(row.inertia, cage=at_one_speed(row, [line], None)[0]))
 
 
-def _held(row: BallRow, cage: float) -> BallRow:
-    assert row.inertia is not None
-    return replace(row, inertia=replace(row.inertia, cage=cage))
-
-
-def _at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -> tuple[float, dict[Vector, tuple[Balance, Driven]]]:
+def at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -> tuple[float, dict[Vector, tuple[Balance, Driven]]]:
     """Speed of the cage, and what a ball is at every different one of `lines` (balls, 2) between the groove centres; balls on the same line, as of centred rings, are one."""
-    assert row.inertia is not None
-    weights, tolerances = Counter(lines), _tolerances(row, lines)
+    free, weights = row.ball, Counter(lines)
+    allowed = tolerances(row, max(hypot(r, z) for r, z in weights))
 
     def mean(values: Mapping[Vector, float]) -> float:
         return sum(n * values[at] for at, n in weights.items()) / len(lines)
 
-    def at_speed(cage: float, balances: Mapping[Vector, Balance]) -> dict[Vector, tuple[Balance, Driven]]:
-        ball = _ball(_held(row, cage))
+    def held(cage: float) -> HeavyBall:
+        return changed(free, inertia=changed(free.inertia, cage=cage))
+
+    def at_speed(ball: HeavyBall, balances: Mapping[Vector, Balance]) -> dict[Vector, tuple[Balance, Driven]]:
         return {at: (here, driven(ball, here, at)) for at, here in balances.items()}
 
-    here = {at: settled(_ball(row), at, *tolerances, centre) for at in weights}
-    if (cage := row.inertia.cage) is not None:
-        return cage, at_speed(cage, here)
-    cage = mean({at: rolling(row.inertia, b.centre, at).speed for at, b in here.items()})
+    here = {at: settled(free, at, *allowed, centre) for at in weights}
+    if (cage := free.inertia.cage) is not None:
+        return cage, at_speed(free, here)
+    cage = mean({at: rolling(free.inertia, b.centre, at).speed for at, b in here.items()})
+    ball = held(cage)
     if len(here) == 1:  # it rolls with them
-        return cage, at_speed(cage, {at: balance(_ball(_held(row, cage)), b.centre, at) for at, b in here.items()})
+        return cage, at_speed(ball, {at: balance(ball, b.centre, at) for at, b in here.items()})
     for _ in range(ROUNDS):
-        here = {at: settled(_ball(_held(row, cage)), at, *tolerances, b.centre) for at, b in here.items()}
-        found = at_speed(cage, here)
+        here = {at: settled(ball, at, *allowed, b.centre) for at, b in here.items()}
+        found = at_speed(ball, here)
         speed, by_cage = (mean({at: getattr(d, of) for at, (_, d) in found.items()}) for of in ("speed", "by_cage"))
         step = (speed - cage) / (1.0 - by_cage)
         if abs(step) <= STANDING * abs(speed):
             return cage, found
         cage += step
+        ball = held(cage)
     raise NoEquilibrium("the speed of a cage did not settle")
 
 
-def _ball(row: BallRow) -> HeavyBall:
-    assert row.inertia is not None
-    return HeavyBall(row.inner_length, row.outer_length, row.inner_constant, row.outer_constant, row.inertia)
-
-
-def _tolerances(row: BallRow, lines: Sequence[Vector]) -> tuple[float, float]:
-    """Of the resultant on a settled ball (N), and of the stiffness added to the step of one that touches nothing (N/m)."""
-    assert row.inertia is not None
-    stretch = max(LEAST_STRETCH, max(hypot(r, z) for r, z in lines) - row.unloaded_distance)
-    contact, flung = row.constant * stretch**1.5, row.inertia.loads((1.0, 0.0), (1.0, 0.0)).centrifugal
+def tolerances(row: BallRow, longest: float) -> tuple[float, float]:
+    """Of the resultant on a settled ball (N), and of the stiffness added to the step of one that touches nothing (N/m); no groove centres are farther apart than `longest` (m)."""
+    stretch, flung = max(LEAST_STRETCH, longest - row.unloaded_distance), row.ball.inertia.flung
+    contact = row.constant * stretch**1.5
     tolerance, least = 1e-12 * contact + 1e-13 * flung, 1e-9 * row.constant * sqrt(stretch)
     # a groove distance is rounded to some of its last bits, which the stiffer race turns into force: 1.5 K^(2/3) F^(1/3) of it
     stiffest = 1.5 * max(row.inner_constant, row.outer_constant) ** (2 / 3) * max(contact, flung) ** (1 / 3)

@@ -22,6 +22,7 @@ Plain numbers: a ball takes a few steps of a few operations, less than one call 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import atan2, hypot, pi, sqrt
 from typing import NamedTuple
 
@@ -54,6 +55,16 @@ class BallInertia:
     def mass(self) -> float:
         return pi / 6 * self.density * self.diameter**3
 
+    @cached_property
+    def scales(self) -> tuple[float, float]:
+        """Centrifugal force over the square of the cage's speed, and gyroscopic moment over the product of the two speeds and the sine."""
+        return self.share * self.mass * self.pitch_diameter / 2, self.share * self.mass * self.diameter * self.pitch_diameter / 10
+
+    @cached_property
+    def flung(self) -> float:
+        """Centrifugal force (N) of a ball whose contacts both lie across the axis."""
+        return self.loads((1.0, 0.0), (1.0, 0.0)).centrifugal
+
     def orbit(self, outer: Vector, inner: Vector) -> Orbit:
         """Speed of the cage about the axis by rolling, for the cosine and sine of the ball's `outer` and `inner` contact angles a_o, a_i.
 
@@ -67,16 +78,15 @@ class BallInertia:
         gamma = self.diameter / self.pitch_diameter
         # a step may lead to where the contacts lie on one side of the ball, and nothing rolls
         lag, both, across = 1 - gamma * ci, max(1 + co * ci + so * si, LEAST_ROLLING), si * co - ci * so
-        relative = self.outer_speed - self.inner_speed
-        behind, by_outer, by_inner = (relative / both * x for x in (lag, -lag * across / both, gamma * si + lag * across / both))
-        return Orbit(self.outer_speed - behind, -by_outer, -by_inner)
+        rate = (self.outer_speed - self.inner_speed) / both
+        turned = lag * across / both
+        return Orbit(self.outer_speed - rate * lag, rate * turned, -rate * (gamma * si + turned))
 
     def loads(self, outer: Vector, inner: Vector) -> Loads:
         """What the ball's inertia asks of its contacts."""
         co, so = outer
         speed, by_outer, by_inner = self.orbit(outer, inner) if self.cage is None else Orbit(self.cage, 0.0, 0.0)
-        orbit = self.share * self.mass * self.pitch_diameter / 2
-        polar = self.share * self.mass * self.diameter * self.pitch_diameter / 10
+        orbit, polar = self.scales
         behind = self.outer_speed - speed
         centrifugal_by_speed, moment_by_speed = 2 * orbit * speed, polar * (behind - speed) * so
         return Loads(
@@ -264,9 +274,9 @@ def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
     turn_r, turn_z = -by_outer_angle * sine - friction * cosine, -by_outer_angle * cosine + friction * sine
     angle_r, angle_z = sine / outer_length, cosine / outer_length
     inner_r, inner_z = iz / inner_length, -ir / inner_length
-    held = _spring((ir, iz), inner_along, inner / inner_length)
-    spring = _spring((er, ez), outer_along, outer / outer_length)
-    by_outer = (spring[0] + turn_r * angle_r, spring[1] + turn_r * angle_z, spring[2] + turn_z * angle_r, spring[3] + turn_z * angle_z)
+    held = spring((ir, iz), inner_along, inner / inner_length)
+    pulled = spring((er, ez), outer_along, outer / outer_length)
+    by_outer = (pulled[0] + turn_r * angle_r, pulled[1] + turn_r * angle_z, pulled[2] + turn_z * angle_r, pulled[3] + turn_z * angle_z)
     drag_r, drag_z = -by_inner_angle * sine, -by_inner_angle * cosine
     passed_on = (drag_r * inner_r, drag_r * inner_z, drag_z * inner_r, drag_z * inner_z)
     flung_r, flung_z = loads.centrifugal_by_inner * inner_r, loads.centrifugal_by_inner * inner_z
@@ -334,7 +344,7 @@ def _contact(vector: Vector, unloaded: float, constant: float) -> tuple[float, V
     return length, (vector[0] / length, vector[1] / length), root * pressed, 1.5 * root
 
 
-def _spring(e: Vector, along: float, across: float) -> Matrix:
+def spring(e: Vector, along: float, across: float) -> Matrix:
     """along e e^T + across (1 - e e^T)."""
     rr, rz, zz = e[0] * e[0], e[0] * e[1], e[1] * e[1]
     more = along - across

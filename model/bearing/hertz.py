@@ -6,14 +6,13 @@ Lubrication* (1981), ch. 3; only the ellipticity equation is solved numerically,
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from math import exp, expm1, isfinite, log
+from math import cos, exp, expm1, isfinite, log, nan, pi, sqrt
 
 import numpy as np
 import scipy
-
-from thermospindle.model.types import Array
 
 NEARLY_ROUND = 1e-3  # of ln k, below which the quotient cancels, and ln k is proportional to the difference
 FLATTEST, KNOTS = 17.0, 400  # of ln k, which it is at most; and how many of it a first guess is made from
@@ -55,7 +54,7 @@ def ellipticity(curvature_difference: float) -> float:
     nearly_round = _of_nearly_round()
     if curvature_difference <= nearly_round:
         return exp(NEARLY_ROUND * curvature_difference / nearly_round)
-    log_k = exp(float(np.interp(log(1 - curvature_difference), *_guess(), left=np.nan)))
+    log_k = exp(_guessed(log(1 - curvature_difference)))
     if not isfinite(log_k):
         raise ValueError(f"curvature difference {curvature_difference!r} is of a contact flatter than exp({FLATTEST:g})")
     for _ in range(MOST_STEPS):
@@ -83,11 +82,24 @@ def _of_nearly_round() -> float:
     return _difference(NEARLY_ROUND)[0]
 
 
+def _guessed(rest: float) -> float:
+    """ln ln k where ln(1 - F) is `rest`: the cubic between two knots with its slopes there, right to 1e-9, from where Newton's method takes a step."""
+    rests, values, slopes = _knots()
+    i = bisect_right(rests, rest)
+    if i == 0:
+        return nan
+    i = min(i, KNOTS - 1)
+    long, rise = rests[i] - rests[i - 1], values[i] - values[i - 1]
+    t = (rest - rests[i - 1]) / long
+    return values[i - 1] + t * (rise + (1 - t) * ((1 - t) * (long * slopes[i - 1] - rise) - t * (long * slopes[i] - rise)))
+
+
 @cache
-def _guess() -> tuple[Array, Array]:
-    """ln(1 - F), rising, and ln ln k; straight lines between them are right to 1e-4, from where Newton's method takes two steps."""
-    log_k = np.geomspace(FLATTEST, NEARLY_ROUND, KNOTS)
-    return np.array([log(1 - _difference(float(v))[0]) for v in log_k]), np.log(log_k)
+def _knots() -> tuple[list[float], list[float], list[float]]:
+    """ln(1 - F), rising, ln ln k and its derivative by that."""
+    log_k = [float(v) for v in np.geomspace(FLATTEST, NEARLY_ROUND, KNOTS)]
+    found = [(v, *_difference(v)) for v in log_k]
+    return [log(1 - f) for _, f, _ in found], [log(v) for v in log_k], [-(1 - f) / (slope * v) for v, f, slope in found]
 
 
 @lru_cache(maxsize=4096)
@@ -106,9 +118,9 @@ def point_contact(
     k = ellipticity(abs(along - across) / total)
     m = 1 - 1 / k**2
     first, second = float(scipy.special.ellipk(m)), float(scipy.special.ellipe(m))
-    modulus = 2 / sum((1 - nu**2) / e for e, nu in (ball, race))
-    stiffness = np.pi * k * modulus * np.sqrt(2 * second / (9 * total * first**3))
-    return Contact(float(stiffness), k, total, modulus)
+    modulus = 2 / ((1 - ball[1] ** 2) / ball[0] + (1 - race[1] ** 2) / race[0])
+    stiffness = pi * k * modulus * sqrt(2 * second / (9 * total * first**3))
+    return Contact(stiffness, k, total, modulus)
 
 
 def race_contact(
@@ -121,11 +133,11 @@ def race_contact(
     race: tuple[float, float],
 ) -> Contact:
     """Contact of a ball with the inner or outer race of a ball bearing (Harris 1991, Eqs. 2.24-2.31)."""
-    gamma = ball_diameter * np.cos(contact_angle) / pitch_diameter
+    gamma = ball_diameter * cos(contact_angle) / pitch_diameter
     rolling = 2 / ball_diameter * (gamma / (1 - gamma) if inner else -gamma / (1 + gamma))
-    return point_contact(ball_diameter, float(rolling), -1 / (conformity * ball_diameter), ball, race)
+    return point_contact(ball_diameter, rolling, -1 / (conformity * ball_diameter), ball, race)
 
 
 def in_series(inner: float, outer: float) -> float:
     """Load-deflection constant of both contacts of a ball that carry the same force: K of Jang et al. 2003, Eq. (6)."""
-    return float((inner ** (-2 / 3) + outer ** (-2 / 3)) ** -1.5)
+    return (inner ** (-2 / 3) + outer ** (-2 / 3)) ** -1.5

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import scipy
 
-from thermospindle.model.bearing.ball_row import BallRow, Centres, centred_axial, centred_axial_force
+from thermospindle.model.bearing.ball_row import BallRow
+from thermospindle.model.bearing.centred import Centres, centred_axial, centred_axial_force
+from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium
 
 STEPS = 20  # of Newton's method, which takes six
@@ -35,14 +38,15 @@ class Rings:
     sleeves: tuple[Sleeve, ...]
     load: float
 
-    @property
+    @cached_property
     def heavy(self) -> bool:
-        return any(row.inertia is not None for row in (*(row for row, _ in self.fixed), *(row for s in self.sleeves for row in s.rows)))
+        rows = [row for row, _ in self.fixed] + [row for s in self.sleeves for row in s.rows]
+        return any(row.inertia is not None for row in rows)
 
     @property
     def massless(self) -> Rings:
-        fixed = tuple((replace(row, inertia=None), towards) for row, towards in self.fixed)
-        return Rings(fixed, tuple(replace(s, rows=tuple(replace(row, inertia=None) for row in s.rows)) for s in self.sleeves), self.load)
+        fixed = tuple((changed(row, inertia=None), towards) for row, towards in self.fixed)
+        return Rings(fixed, tuple(changed(s, rows=tuple(changed(row, inertia=None) for row in s.rows)) for s in self.sleeves), self.load)
 
 
 def equilibrium(rings: Rings, centres: Centres) -> tuple[float, ...]:

@@ -8,19 +8,22 @@ row's axial force rises monotonically with the hub's movement, so the root is un
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from math import sin
 
 import numpy as np
 import scipy
 
-from thermospindle.model.bearing.ball_row import BallRow, Centres, RowForce, centred_axial_force, respond
+from thermospindle.model.bearing.ball_row import BallRow
+from thermospindle.model.bearing.centred import Centres, centred, centred_axial_force
 from thermospindle.model.bearing.heavy_ball import Vector
 from thermospindle.model.bearing.movement import Rings, Sleeve, equilibrium
 from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.row import row_at
 from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
+from thermospindle.model.changed import changed
 from thermospindle.model.errors import BadInput, NoEquilibrium, instead
-from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, Spindle
+from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, Spindle, kept
 from thermospindle.model.types import Array
 
 TOUCHING = 1e-9
@@ -117,12 +120,12 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     rows = {b.name: row_at(spindle, b, b.sense, motions[b.name], condition.speed) for b in spindle.bearings}
     moved: dict[str, float] = {}
     centres: Centres = {}
-    for group in joined(spindle):
-        moved |= _positions(spindle, {b.name: rows[b.name] for b in group}, group, centres)
+    for rotor in rotors(spindle):
+        moved |= _positions(spindle, rotor, rows, centres)
     states = []
     for b in spindle.bearings:
         row = rows[b.name]
-        states.append(bearing_state(spindle, b, replace(row, axial=row.axial + moved[b.name]), centres.get(row), moved[b.name]))
+        states.append(bearing_state(spindle, b, changed(row, axial=row.axial + moved[b.name]), centres.get(id(row)), moved[b.name]))
     sliding = {name for s in spindle.sets if s.spring is not None for name in s.spring.rings_of}
     hub = next((moved[b.name] for b in spindle.bearings if b.name not in sliding), 0.0)
     linear: tuple[LinearState, ...] = tuple(linear_state(spindle, b, condition) for b in spindle.linear_bearings)
@@ -130,6 +133,7 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     return PairState(condition, tuple(states), hub, contact_status(tuple(states)), linear)
 
 
+@kept
 def joined(spindle: Spindle) -> list[list[Bearing]]:
     """The ball rows in groups that share carriers: what one rotor's equilibrium is made of."""
     groups: list[tuple[set[str], list[Bearing]]] = []
@@ -147,48 +151,67 @@ def _carriers(spindle: Spindle, b: Bearing) -> tuple[str, str]:
     return spindle.structure.carrier(b.inner_body), spindle.structure.carrier(b.outer_body)
 
 
-def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Bearing], centres: Centres) -> dict[str, float]:
-    """Movement (m) of every row's outer ring against its inner one, for one group of rows that share carriers."""
+@dataclass(frozen=True)
+class Rotor:
+    """One group of rows that share carriers, as drawn: the carriers of the rings `of` every row, which way the hub takes each row (1 or -1), rows on springs, as `Sleeve` has these, and the
+    force on the hub that preloads rows which are loaded one way (N).
+
+    The one unknown of two carriers is how far the second carrier of the first row has moved against its first.
+    """
+
+    carriers: list[str]
+    of: dict[str, tuple[str, str]]
+    sets: list[BearingSet]
+    towards: dict[str, int]
+    springs: list[tuple[tuple[str, ...], float, float]]
+    outside: float
+
+
+@kept
+def rotors(spindle: Spindle) -> list[Rotor]:
+    """Every group of `joined`."""
+    return [_rotor(spindle, group) for group in joined(spindle)]
+
+
+def _rotor(spindle: Spindle, group: Sequence[Bearing]) -> Rotor:
     of = {b.name: _carriers(spindle, b) for b in group}
-    carriers = list(dict.fromkeys(c for pair in of.values() for c in pair))
-    sets = [s for s in spindle.sets if s.bearings[0] in rows]
-    springs = [(s.spring.rings_of, spindle.bearing(s.spring.rings_of[0]).sense * s.preload, s.spring.rate or 0.0) for s in sets if s.spring is not None]
-    if len(carriers) > 2:
-        if springs or spindle.axial_load:
-            raise NoEquilibrium(f"rings on springs and axial loads are for one rotor in one housing; here are {', '.join(carriers)}")
-        return _many_positions(spindle, rows, of, carriers, sets)
-    # one unknown: how far the second carrier of the first row has moved against its first
+    sets = [s for s in spindle.sets if s.bearings[0] in of]
     towards = {name: 1 if pair == of[group[0].name] else -1 for name, pair in of.items()}
+    springs = [(s.spring.rings_of, spindle.bearing(s.spring.rings_of[0]).sense * s.preload, s.spring.rate or 0.0) for s in sets if s.spring is not None]
     # rows loaded one way carry all shares together, from outside; opposed ones carry each other's
     outside = sum(towards[name] * spindle.bearing(name).sense * s.preload / len(s.bearings) for s in sets if spindle.one_way(s) for name in s.bearings)
-    sliding = [name for names, _, _ in springs for name in names]
+    return Rotor(list(dict.fromkeys(c for pair in of.values() for c in pair)), of, sets, towards, springs, outside)
+
+
+def _positions(spindle: Spindle, rotor: Rotor, every: Mapping[str, BallRow], centres: Centres) -> dict[str, float]:
+    """Movement (m) of every row's outer ring against its inner one, for one group of rows that share carriers."""
+    rows = {name: every[name] for name in rotor.of}
+    if len(rotor.carriers) > 2:
+        if rotor.springs or spindle.axial_load:
+            raise NoEquilibrium(f"rings on springs and axial loads are for one rotor in one housing; here are {', '.join(rotor.carriers)}")
+        return _many_positions(spindle, rows, rotor)
+    towards, sliding = rotor.towards, {name for names, _, _ in rotor.springs for name in names}
     fixed = tuple((row, towards[name]) for name, row in rows.items() if name not in sliding)
-    sleeves = tuple(Sleeve(tuple(rows[n] for n in names), towards[names[0]], push, rate) for names, push, rate in springs)
+    sleeves = tuple(Sleeve(tuple(rows[n] for n in names), towards[names[0]], push, rate) for names, push, rate in rotor.springs)
     try:
-        hub, *slid = equilibrium(Rings(fixed, sleeves, outside + spindle.axial_load), centres)
+        hub, *slid = equilibrium(Rings(fixed, sleeves, rotor.outside + spindle.axial_load), centres)
     except NoEquilibrium as error:
         raise NoEquilibrium(f"{error} under axial_load_N = {spindle.axial_load:g}" if spindle.axial_load else str(error)) from None
     moved = {name: towards[name] * hub for name in rows}
-    for (names, _, _), r in zip(springs, slid, strict=True):
+    for (names, _, _), r in zip(rotor.springs, slid, strict=True):
         moved |= dict.fromkeys(names, r)
     return moved
 
 
-def _many_positions(
-    spindle: Spindle,
-    rows: Mapping[str, BallRow],
-    of: Mapping[str, tuple[str, str]],
-    carriers: Sequence[str],
-    sets: Sequence[BearingSet],
-) -> dict[str, float]:
+def _many_positions(spindle: Spindle, rows: Mapping[str, BallRow], rotor: Rotor) -> dict[str, float]:
     """As `_positions` for more than two carriers, as of rotors within rotors: all balances at once, by Powell's hybrid method.
 
     The energy of rows without ball inertia is convex in the positions, so that their answer is unique; it is the start for those with it.
     """
-    names, unknown = list(rows), list(carriers[1:])
-    motion = np.array([[(of[n][1] == c) - (of[n][0] == c) for c in unknown] for n in names], float)
+    names, unknown = list(rows), rotor.carriers[1:]
+    motion = np.array([[(rotor.of[n][1] == c) - (rotor.of[n][0] == c) for c in unknown] for n in names], float)
     outside = np.zeros(len(names))
-    for s in sets:
+    for s in rotor.sets:
         if spindle.one_way(s):
             for name in s.bearings:
                 outside[names.index(name)] = spindle.bearing(name).sense * s.preload / len(s.bearings)
@@ -198,11 +221,11 @@ def _many_positions(
         force = np.array([centred_axial_force(row, float(m)) for row, m in zip(at, motion @ (1e-6 * z), strict=True)])
         return np.asarray(motion.T @ (force - outside)) / scale
 
-    massless = [replace(row, inertia=None) for row in rows.values()]
+    massless = [changed(row, inertia=None) for row in rows.values()]
     start = scipy.optimize.root(imbalance, np.zeros(len(unknown)), args=(massless,), options={"xtol": 1e-13})
     end = scipy.optimize.root(imbalance, start.x, args=(list(rows.values()),), options={"xtol": 1e-13})
     if np.abs(end.fun).max() > 1e-6:
-        raise NoEquilibrium(f"the bearings between {', '.join(carriers)} find no axial equilibrium")
+        raise NoEquilibrium(f"the bearings between {', '.join(rotor.carriers)} find no axial equilibrium")
     return {name: float(m) for name, m in zip(names, motion @ (1e-6 * end.x), strict=True)}
 
 
@@ -222,10 +245,9 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
 
     Its balls settle at or near `centre`, where one knows.
     """
-    answer: RowForce = respond(row, centre=centre)
-    deformation = float(answer.deformation[0])
+    answer = centred(row, centre)
     # where rings are free to move between their balls, the equilibrium that is found lies at an end of that play, a rounding error within contact
-    felt = TOUCHING * b.preload / (b.balls * np.sin(b.contact_angle))
+    felt = TOUCHING * b.preload / (b.balls * sin(b.contact_angle))
     stiffness = answer.tangent
     if row.inertia is not None:
         # outer-race control makes the tangent of heavy balls unsymmetric, by 1e-4 of it, under radial loads with the cage's speed by up to a hundredth; springs, in MuJoCo too, carry the symmetric part
@@ -233,16 +255,16 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
     return BearingState(
         name=b.name,
         z=b.z,
-        contact_angle=float(answer.inner_angle[0]),
-        outer_contact_angle=float(answer.outer_angle[0]),
-        deformation=deformation,
-        contact_force=float(answer.ball_force[0]),
-        ball_stiffness=1.5 * row.constant * max(deformation, 0.0) ** 0.5,
-        preload=b.sense * float(answer.force[2]),
+        contact_angle=answer.inner_angle,
+        outer_contact_angle=answer.outer_angle,
+        deformation=answer.deformation,
+        contact_force=answer.ball_force,
+        ball_stiffness=1.5 * row.constant * max(answer.deformation, 0.0) ** 0.5,
+        preload=b.sense * answer.axial_force,
         stiffness=stiffness,
         damping=damping_time(spindle, b) * stiffness,
         row=row,
-        in_contact=bool(answer.in_contact.all() and answer.ball_force.min() > felt),
-        outer_contact_force=float(answer.outer_ball_force[0]),
+        in_contact=answer.ball_force > max(felt, 0.0),
+        outer_contact_force=answer.outer_ball_force,
         movement=movement,
     )

@@ -7,8 +7,7 @@ the grooves grow too, which makes a uniform expansion of everything leave the co
 from __future__ import annotations
 
 from functools import lru_cache
-
-import numpy as np
+from math import atan2, cos, sin
 
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow
 from thermospindle.model.bearing.hertz import in_series, race_contact
@@ -23,6 +22,10 @@ def reference_motion(temperature: float) -> RingMotion:
     return RingMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, temperature)
 
 
+NOT_MOVED = reference_motion(0.0)
+"""Of rings whose elastic moduli are known already."""
+
+
 def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: float) -> BallRow:
     """The ball row of bearing `b` with its rings moved by `motion` and the hub not yet moved.
 
@@ -30,19 +33,18 @@ def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: 
     middle: Jang et al. 2003, Eqs. (1)-(5).
     """
     loaded = b.unloaded_distance + reference_deformation(spindle, b)
-    radial = loaded * np.cos(b.contact_angle)
-    axial = loaded * np.sin(b.contact_angle)
+    radial, axial = loaded * cos(b.contact_angle), loaded * sin(b.contact_angle)
     d, fi, fo = b.ball_diameter, b.inner_conformity, b.outer_conformity
     radial += motion.inner_r + fi * d * motion.inner_strain - (motion.outer_r - fo * d * motion.outer_strain)
     inner_share = (fi - 0.5) / (fi + fo - 1)  # the groove centres lie off the ring's middle by this share of their distance
     growth = inner_share * motion.inner_strain + (1 - inner_share) * motion.outer_strain
     axial += sense * (motion.outer_z - motion.inner_z) + growth * axial
     ball_radius = d / 2 * (1 + motion.ball_strain)
-    inner_constant, outer_constant = contact_constants(spindle, b, motion, float(np.arctan2(axial, radial)))
+    inner_constant, outer_constant = contact_constants(spindle, b, motion, atan2(axial, radial))
     return BallRow(
         balls=b.balls,
-        radial=float(radial),
-        axial=float(sense * axial),
+        radial=radial,
+        axial=sense * axial,
         inner_length=fi * d * (1 + motion.inner_strain) - ball_radius,
         outer_length=fo * d * (1 + motion.outer_strain) - ball_radius,
         inner_constant=inner_constant,
@@ -54,14 +56,13 @@ def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: 
 
 def reference_deformation(spindle: Spindle, b: Bearing) -> float:
     """Deformation (m) of each ball under the preload at the reference temperature, both contacts: Eq. (6) inverted."""
-    motion = reference_motion(spindle.reference_temperature)
-    return _reference_deformation(b, *elastic(spindle, b, motion.temperature), motion)
+    return _reference_deformation(b, *elastic(spindle, b, spindle.reference_temperature))
 
 
 @lru_cache(maxsize=4096)
-def _reference_deformation(b: Bearing, ball: Elastic, ring: Elastic, motion: RingMotion) -> float:
-    constants = _contact_constants(b, ball, ring, motion, b.contact_angle)
-    return float((b.preload / (b.balls * np.sin(b.contact_angle)) / in_series(*constants)) ** (2 / 3))
+def _reference_deformation(b: Bearing, ball: Elastic, ring: Elastic) -> float:
+    constants = _contact_constants(b, ball, ring, NOT_MOVED, b.contact_angle)
+    return (b.preload / (b.balls * sin(b.contact_angle)) / in_series(*constants)) ** (2 / 3)
 
 
 def contact_constants(spindle: Spindle, b: Bearing, motion: RingMotion, angle: float) -> tuple[float, float]:
@@ -77,14 +78,12 @@ def elastic(spindle: Spindle, b: Bearing, temperature: float) -> tuple[Elastic, 
 
 def _contact_constants(b: Bearing, ball: Elastic, ring: Elastic, motion: RingMotion, angle: float) -> tuple[float, float]:
     d = b.ball_diameter * (1 + motion.ball_strain)
-    inner, outer = (
-        race_contact(d, f * b.ball_diameter * (1 + strain) / d, b.pitch_diameter * (1 + strain), angle, is_inner, ball, ring).stiffness
-        for f, strain, is_inner in (
-            (b.inner_conformity, motion.inner_strain, True),
-            (b.outer_conformity, motion.outer_strain, False),
-        )
-    )
-    return b.constant_factor * inner, b.constant_factor * outer
+
+    def of(conformity: float, strain: float, is_inner: bool) -> float:
+        contact = race_contact(d, conformity * b.ball_diameter * (1 + strain) / d, b.pitch_diameter * (1 + strain), angle, is_inner, ball, ring)
+        return b.constant_factor * contact.stiffness
+
+    return of(b.inner_conformity, motion.inner_strain, True), of(b.outer_conformity, motion.outer_strain, False)
 
 
 def _ball_inertia(spindle: Spindle, b: Bearing, speed: float) -> BallInertia | None:

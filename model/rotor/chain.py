@@ -17,7 +17,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.loss import damping_of_loss
-from thermospindle.model.structure import MOVES, Body, Structure
+from thermospindle.model.structure import MOVES, Body, Joint, Structure
 from thermospindle.model.types import Array, Integers
 
 
@@ -58,6 +58,11 @@ Layout = tuple[tuple[str, float, tuple[str, ...]], ...]
 """Name, height and moves of every body."""
 
 
+@lru_cache(maxsize=64)
+def _dofs(layout: Layout) -> tuple[tuple[str, str], ...]:
+    return tuple((name, move) for name, _, moves in layout for move in moves)
+
+
 @dataclass(frozen=True)
 class RotorBase:
     bodies: tuple[Body, ...]
@@ -67,7 +72,7 @@ class RotorBase:
     @cached_property
     def dofs(self) -> tuple[tuple[str, str], ...]:
         """(body, move) of every degree of freedom, in order."""
-        return tuple((b.name, move) for b in self.bodies for move in b.moves)
+        return _dofs(self.layout)
 
     @cached_property
     def layout(self) -> Layout:
@@ -126,9 +131,16 @@ def sprung(chain: RotorBase, names: Sequence[str], rate: float, mass: float) -> 
 
 
 def joint_element(structure: Structure, index: int) -> Element:
-    joint = structure.joints[index]
+    return _joint_element(structure.joints[index], structure.damping_frequency)
+
+
+@lru_cache(maxsize=1024)
+def _joint_element(joint: Joint, damping_frequency: float) -> Element:
+    """Read only."""
     stiffness = np.diag(joint.stiffness)
-    damping = 2 * joint.damping_ratio / (2 * np.pi * structure.damping_frequency) * stiffness
+    damping = 2 * joint.damping_ratio / (2 * np.pi * damping_frequency) * stiffness
+    for matrix in (stiffness, damping):
+        matrix.flags.writeable = False
     return Element(joint.name, joint.group, *joint.bodies, joint.z, stiffness, damping, loss_factor=joint.loss_factor)
 
 
@@ -181,28 +193,29 @@ def row_of(layout: Layout, point: Point) -> Array:
 
 def matrices(chain: RotorBase) -> Matrices:
     """M, C + G, K assembled element by element (independent of MuJoCo)."""
-    n = len(chain.dofs)
-    mass, damping, stiffness = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
-    at = 0
+    n, speed = len(chain.dofs), chain.speed
+    mass: list[float] = []
+    damping, stiffness = _felt(chain, n) if chain.elements else np.zeros((2, n, n))
     for body in chain.bodies:
-        inertia = dict(zip(MOVES, (body.mass, body.mass, body.mass, *body.inertia[:2]), strict=True))
-        mass[at : at + len(body.moves)] = [inertia[move] for move in body.moves]
         if body.turns:
-            i, j = at + body.moves.index("tilt_x"), at + body.moves.index("tilt_y")
-            damping[i, j] += body.inertia[2] * chain.speed * body.speed_ratio
-            damping[j, i] -= body.inertia[2] * chain.speed * body.speed_ratio
-        at += len(body.moves)
-    if chain.elements:
-        rows, place = _places(chain.layout, tuple((e.a, e.b, e.z, e.slides) for e in chain.elements))
-        for whole, of_elements in (
-            (damping, [e.damping for e in chain.elements]),
-            (stiffness, [e.stiffness for e in chain.elements]),
-        ):
-            felt = rows.transpose(0, 2, 1) @ np.array(of_elements) @ rows
-            whole += np.bincount(place, felt.ravel(), n * n).reshape(n, n)
+            i, j = len(mass) + body.moves.index("tilt_x"), len(mass) + body.moves.index("tilt_y")
+            damping[i, j] += body.inertia[2] * speed * body.speed_ratio
+            damping[j, i] -= body.inertia[2] * speed * body.speed_ratio
+        inertia = dict(zip(MOVES, (body.mass, body.mass, body.mass, *body.inertia[:2]), strict=True))
+        mass += [inertia[move] for move in body.moves]
     if any(e.loss_factor for e in chain.elements):
-        damping += lost(chain, mass, stiffness)
-    return Matrices(np.diag(mass), damping, stiffness, chain.dofs)
+        damping += lost(chain, np.array(mass), stiffness)
+    whole = np.zeros((n, n))
+    whole.flat[:: n + 1] = mass
+    return Matrices(whole, damping, stiffness, chain.dofs)
+
+
+def _felt(chain: RotorBase, n: int) -> Array:
+    """Damping and stiffness (2, n, n) of a chain's elements."""
+    rows, place = _places(chain.layout, tuple((e.a, e.b, e.z, e.slides) for e in chain.elements))
+    of_elements = np.concatenate([*(e.damping for e in chain.elements), *(e.stiffness for e in chain.elements)]).reshape(2, -1, 5, 5)
+    found = np.bincount(place, (rows.transpose(0, 2, 1) @ (of_elements @ rows)).ravel(), 2 * n * n)
+    return np.asarray(found, float).reshape(2, n, n)
 
 
 def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
@@ -213,7 +226,7 @@ def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
 @lru_cache(maxsize=64)
 def _places(layout: Layout, elements: tuple[tuple[str, str, float, str], ...]) -> tuple[Array, Integers]:
     """Rows (elements, 5, w) of the relative motion that each element (a, b, z, slides) resists, over the w degrees of freedom of its ends, and the place
-    (elements w w,) of each of its terms in a whole matrix; fewer than w are filled up with zeros at place 0."""
+    (2 elements w w,) of each of its terms in one of two whole matrices after each other; fewer than w are filled up with zeros at place 0."""
     first, at = {"ground": range(0)}, 0
     for name, _, moves in layout:
         first[name] = range(at, at + len(moves))
@@ -224,4 +237,5 @@ def _places(layout: Layout, elements: tuple[tuple[str, str, float, str], ...]) -
     for k, ((a, b, z, slides), numbers) in enumerate(zip(elements, own, strict=True)):
         rows[k, :, : len(numbers)] = _element_rows(layout, a, b, z, slides)[:, numbers]
         number[k, : len(numbers)] = numbers
-    return rows, (number[:, :, None] * at + number[:, None, :]).ravel()
+    place = (number[:, :, None] * at + number[:, None, :]).ravel()
+    return rows, np.concatenate([place, at * at + place])

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
 
-from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices, motion_rows, point_row
+from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.rotor.chain import Layout, Matrices, RotorBase, element_rows, matrices, motion_rows, row_of
 from thermospindle.model.rotor.reduced import FINE, reduced
 from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.structure import MOVES
@@ -174,9 +174,15 @@ def _solved(linear: Matrices, response: Array, reference: Array, s: ComplexArray
 
 
 def point_rows(spindle: Spindle, chain: RotorBase, nodes: tuple[int, ...] | None = None) -> Array:
-    """Rows (n_points, n) of the scene's measuring points, in the order of `nodes` (all by default)."""
-    chosen = spindle.points if nodes is None else tuple(spindle.point(n) for n in nodes)
-    return np.array([point_row(chain, p) for p in chosen])
+    """Rows (n_points, n) of the scene's measuring points, in the order of `nodes` (all by default); read only."""
+    return _point_rows(chain.layout, spindle.points if nodes is None else tuple(spindle.point(n) for n in nodes))
+
+
+@lru_cache(maxsize=256)
+def _point_rows(layout: Layout, points: tuple[Point, ...]) -> Array:
+    rows = np.array([row_of(layout, p) for p in points])
+    rows.flags.writeable = False
+    return rows
 
 
 def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.inf) -> list[Mode]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.built.imperfections import Imperfections
@@ -230,6 +231,11 @@ class Effect:
     drifts: str = ""  # of one drafted from a diagnosis: the element, or effect, whose change it is
     lasting: bool = False  # its size is the same in every test, as a mass is: no law that data may depart from
     exact: bool = False  # mechanics or the material alone gives its law over speed and temperature: data may hardly depart from it, and have none of their own
+
+    @cached_property
+    def hooks(self) -> frozenset[str]:
+        """Names of the functions that it has."""
+        return frozenset(hook for hook in HOOKS if getattr(self, hook))
 
     def neutral(self) -> dict[str, float]:
         return {p.name: p.neutral for p in self.parameters}

@@ -17,7 +17,8 @@ from scipy.optimize import brentq
 from tests.blind.hidden import Hidden
 from tests.blind.hidden_structure import excited, on_spring
 from tests.blind.laws import REFERENCE, Place
-from thermospindle.model.bearing.ball_row import BallRow, centred_axial_force
+from thermospindle.model.bearing.ball_row import BallRow
+from thermospindle.model.bearing.centred import centred_axial_force
 from thermospindle.model.bearing.pair import PairState, bearing_state, contact_status
 from thermospindle.model.bearing.row import reference_motion, row_at
 from thermospindle.model.machine import Condition, RingMotion, Spindle

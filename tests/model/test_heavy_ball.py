@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from thermospindle.model.bearing import heavy_ball
-from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centre_line, centred_axial_force, respond
+from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centre_line, respond
+from thermospindle.model.bearing.centred import centred_axial_force
 from thermospindle.model.bearing.heavy_ball import HeavyBall, balance, settled
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition

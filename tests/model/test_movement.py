@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centred_axial, respond
+from thermospindle.model.bearing.ball_row import BallInertia, BallRow, respond
+from thermospindle.model.bearing.centred import centred_axial
 from thermospindle.model.bearing.movement import NEAR, REACH, Rings, Sleeve, _bracketed, _near, equilibrium
 
 ROW = BallRow(16, 1.0e-3, 0.42e-3, 0.53e-3, 0.545e-3, 8e9, 9e9, 25e-3)

@@ -63,7 +63,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
     """Ring motions by the chamber's temperature as softer materials change them, to first order in the softening."""
-    from thermospindle.thermal.influence import raceways  # finite elements, which the catalogue is read without
+    from thermospindle.thermal.influence import every_race  # finite elements, which the catalogue is read without
 
     scale = values["scale"]
     if scale == 0.0 or condition.temperature == spindle.reference_temperature:
@@ -77,7 +77,7 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
         change |= dict(zip(found.races, moved.reshape(-1, 2), strict=True))
     changed = {}
     for b in spindle.ringed:
-        motion, (inner, outer) = by_bearing[b.name], (change[race] for race in raceways(spindle, b))
+        motion, (inner, outer) = by_bearing[b.name], (change[race] for race in every_race(spindle)[b.name])
         changed[b.name] = replace(
             motion,
             inner_r=motion.inner_r + float(inner[0]),
@@ -112,12 +112,12 @@ class Section:
 
 def sensitivity(spindle: Spindle) -> tuple[Sensitivity, ...]:
     """Solved once for each section and set of moduli, part by part."""
-    from thermospindle.thermal.influence import raceways
+    from thermospindle.thermal.influence import every_race
 
     moduli = tuple(
         (m.youngs_modulus(spindle.reference_temperature), m.poisson_ratio) for m in (spindle.materials[g.material] for g in spindle.regions)
     )
-    faces = tuple(raceways(spindle, b) for b in spindle.ringed)
+    faces = tuple(every_race(spindle).values())
     return _sensitivity(Section((spindle.regions, moduli, faces), spindle))
 
 

@@ -14,7 +14,7 @@ import scipy
 
 from thermospindle.model.bearing.row import relative_speed
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.machine import Bearing, Condition, Friction, RollerBearing, Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import RINGS, Effect, Parameter, Values, scale_parameter
 from thermospindle.thermal import friction
@@ -62,24 +62,34 @@ def levelled(spindle: Spindle, regions: tuple[str, ...], rise: Array) -> Array:
 
 def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
     """Friction heat (bearings,) in W where every lubricant has the temperature that all of it makes. OutsideRange where that is beyond its viscosity's law."""
-    law, loads, cold = spindle.thermal.friction, friction.loads(spindle), np.full(len(spindle.ringed), condition.temperature)
-    speeds = [relative_speed(spindle, b, condition.speed) for b in spindle.ringed]
+    loads = friction.loads(spindle)
+    bearings = tuple((b, relative_speed(spindle, b, condition.speed), loads[b.name]) for b in spindle.ringed)
+    return _heat(spindle.thermal.friction, bearings, condition.temperature, unit)
+
+
+@lru_cache(maxsize=256)
+def _heat(law: Friction, bearings: tuple[tuple[Bearing | RollerBearing, float, float], ...], temperature: float, unit: UnitRise) -> Array:
+    """Of bearings with the speed of their rings and their load, where all is at one temperature but for their own heat; read only. Spindles that differ in their structure ask for the same."""
+    every, speeds, _ = zip(*bearings, strict=True)
+    by_name, cold = {b.name: load for b, _, load in bearings}, np.full(len(bearings), temperature)
     low, high = law.viscosity.temperature[0], law.viscosity.temperature[-1]
     try:
-        return friction.balanced(law, spindle.ringed, speeds, loads, cold, unit.bearing)
+        found = friction.balanced(law, every, speeds, by_name, cold, unit.bearing)
+        found.flags.writeable = False
+        return found
     except OutsideRange:
-        end = high if condition.temperature >= low else low
-        at_end = [friction.heat(law, b, speed, end, loads[b.name]) for b, speed in zip(spindle.ringed, speeds, strict=True)]
+        end = high if temperature >= low else low
+        at_end = [friction.heat(law, b, speed, end, load) for b, speed, load in bearings]
         warm = (cold + np.array(at_end) @ unit.bearing).max()
         raise OutsideRange(f"bearing friction brings the lubricant to {warm:.0f} C, and its viscosity is given from {low:g} to {high:g} C") from None
 
 
 def unit_rise(spindle: Spindle) -> UnitRise:
     """Solved once for each section, set of conductivities and cooling."""
-    from thermospindle.thermal.influence import raceways
+    from thermospindle.thermal.influence import every_race
 
     conductivity = tuple(spindle.materials[g.material].conductivity for g in spindle.regions)
-    rings = tuple(raceways(spindle, b) for b in spindle.ringed)
+    rings = tuple(every_race(spindle).values())
     thermal = spindle.thermal
     key = (spindle.regions, conductivity, rings, thermal.convections, thermal.gaps, thermal.friction.conductance)
     return _unit_rise(Conduction(key, spindle))
