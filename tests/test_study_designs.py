@@ -91,3 +91,15 @@ def test_of_two_alike_none_is_better_by_three_errors(draws):
     apart = better(np.arange(draws) + 100.0, np.arange(draws) * 1.0, higher=True)
     assert apart.probability == 1.0
     assert (3 * apart.sd < 0.5) == (draws > 6)
+
+
+def test_a_speed_that_one_design_alone_does_not_bear_is_told_with_its_name(tmp_path, capsys):
+    study(tmp_path, COMPARED.replace("mk7702", "five_bearing").replace("7200", "60000"))
+    (warning, *others) = json.loads(capsys.readouterr().out)["warnings"]
+    assert warning.startswith("five_bearing: 60000 rpm means a speed factor n dm of ")
+    assert all(w.startswith("five_bearing: 60000 rpm means ") for w in others)
+
+
+def test_a_temperature_that_no_design_bears_is_told_once(tmp_path, capsys):
+    study(tmp_path, COMPARED.replace("temperatures_C = [20]", "temperatures_C = [130]"))
+    assert [w.split(" lies ")[0] for w in json.loads(capsys.readouterr().out)["warnings"]] == ["130 C"]
