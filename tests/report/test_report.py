@@ -13,12 +13,13 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.made_campaign import other_campaign
+from tests.model.test_loaded import rollers
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import group_energy
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.report.page.comparison import Table, compared
 from thermospindle.report.page.headlines import headlines, misses
-from thermospindle.report.page.report import background, html, named, stamp, write_report
+from thermospindle.report.page.report import _page, background, bearing_figures, html, named, stamp, write_report
 from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.hammer.test import estimate_of
 from thermospindle.sim.operating import operating_point
@@ -161,6 +162,15 @@ def test_bearing_table(run: Run, page: Page):
         exact = [np.degrees(b.contact_angle), b.deformation * 1e6, b.contact_force, b.ball_stiffness * 1e-6]
         exact += [b.preload, b.radial_stiffness * 1e-6, b.axial_stiffness * 1e-6]
         assert [number(c) for c in row[2:9]] == pytest.approx(exact, abs=0.000501)
+
+
+def test_a_machine_on_rollers_alone_has_no_empty_table_of_balls():
+    """It had the head of one, over no row, and then "The same of rollers"."""
+    spindle = rollers()
+    few = SimpleNamespace(spindle=spindle, steps=[SimpleNamespace(point=operating_point(spindle, Condition(20.0)))])
+    found = Page(str(_page().bearings(bearing_figures(few), few)))
+    assert list(found.tables) == ["rollers"]
+    assert [row[1] for row in found.tables["rollers"][1:]] == [b.name for b in spindle.roller_bearings]
 
 
 def test_mode_table(run: Run, page: Page):
