@@ -21,6 +21,7 @@ from thermospindle.report.figures.resonance import figures
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe, log_json
 from thermospindle.report.log.turning.map import write_map_log
+from thermospindle.report.log.turning.map import summary
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import strongest
@@ -182,6 +183,10 @@ def test_a_sentence_tells_what_was_mapped(spindle, found):
     assert "Lines on the map: " in (text := console.export_text())
     assert one.lines[0].line.name in text
     assert "of the scene's imperfections" in text if one.drawn_from is None else f"(seed {one.drawn_from}; the scene names none)" in text
+    for shown in (map_section(none)[1], summary(none)):  # the head of a table stood over no row, in the report and in the log
+        assert "Lines on the map: " in shown
+        assert "margin" not in shown
+    assert "Lines on the map" not in map_section(one)[1]
 
 
 def test_help_says_which_speeds_are_mapped(capsys):
