@@ -37,6 +37,9 @@ def test_designs_stand_side_by_side_as_each_is_alone(tmp_path, capsys):
         assert figures["lowest_damping_ratio"]["designs"][name]["nominal"] == pytest.approx(lowest.damping_ratio, rel=1e-9)
     assert figures["stiffness_N_per_um.x"]["designs"]["mk7702"]["nominal"] == pytest.approx(235.6035, rel=1e-6)  # the nose, with shear, as `model.rotor.static` tells it
     assert (figures["lowest_Hz"]["better"], figures["rro_um.x"]["better"]) == ("higher", "lower")
+    nonrepeatable = figures["nrro_six_sigma_um.x"]["designs"]  # of bearings given by numbers 0 was told, and that they are the better ones
+    assert nonrepeatable["hdd_2003"]["nominal"] > 0
+    assert nonrepeatable["mk7702"]["nominal"] is None
     assert (out / "comparison.png").is_file()
     assert main(["inspect", str(out / "study.rrd"), "--json"]) == 0
     log = json.loads(capsys.readouterr().out)
