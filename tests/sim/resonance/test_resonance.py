@@ -20,8 +20,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.resonance import figures
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe, log_json
-from thermospindle.report.log.turning.map import write_map_log
-from thermospindle.report.log.turning.map import summary
+from thermospindle.report.log.turning.map import summary, write_map_log
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import strongest
