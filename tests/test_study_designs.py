@@ -37,6 +37,9 @@ def test_designs_stand_side_by_side_as_each_is_alone(tmp_path, capsys):
         assert figures["lowest_damping_ratio"]["designs"][name]["nominal"] == pytest.approx(lowest.damping_ratio, rel=1e-9)
     assert figures["stiffness_N_per_um.x"]["designs"]["mk7702"]["nominal"] == pytest.approx(235.6035, rel=1e-6)  # the nose, with shear, as `model.rotor.static` tells it
     assert (figures["lowest_Hz"]["better"], figures["rro_um.x"]["better"]) == ("higher", "lower")
+    nonrepeatable = figures["nrro_six_sigma_um.x"]["designs"]  # of bearings given by numbers 0 was told, and that they are the better ones
+    assert nonrepeatable["hdd_2003"]["nominal"] > 0
+    assert nonrepeatable["mk7702"]["nominal"] is None
     assert (out / "comparison.png").is_file()
     assert main(["inspect", str(out / "study.rrd"), "--json"]) == 0
     log = json.loads(capsys.readouterr().out)
@@ -91,3 +94,15 @@ def test_of_two_alike_none_is_better_by_three_errors(draws):
     apart = better(np.arange(draws) + 100.0, np.arange(draws) * 1.0, higher=True)
     assert apart.probability == 1.0
     assert (3 * apart.sd < 0.5) == (draws > 6)
+
+
+def test_a_speed_that_one_design_alone_does_not_bear_is_told_with_its_name(tmp_path, capsys):
+    study(tmp_path, COMPARED.replace("mk7702", "five_bearing").replace("7200", "60000"))
+    (warning, *others) = json.loads(capsys.readouterr().out)["warnings"]
+    assert warning.startswith("five_bearing: 60000 rpm means a speed factor n dm of ")
+    assert all(w.startswith("five_bearing: 60000 rpm means ") for w in others)
+
+
+def test_a_temperature_that_no_design_bears_is_told_once(tmp_path, capsys):
+    study(tmp_path, COMPARED.replace("temperatures_C = [20]", "temperatures_C = [130]"))
+    assert [w.split(" lies ")[0] for w in json.loads(capsys.readouterr().out)["warnings"]] == ["130 C"]

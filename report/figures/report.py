@@ -59,15 +59,15 @@ FEW, COLUMNS = 2, 3  # bearings named among the curves; names side by side above
 
 @rc_context(STYLE)
 def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[str, Sequence[float]]], label: str, from_zero: bool) -> str:
-    """One quantity of every bearing over temperature, or several beside their names: values by name and by bearing."""
+    """One quantity of every bearing over temperature, or several beside their names, the second with open marks: values by name and by bearing."""
     figure = Figure(figsize=(3.55, 2.45))
     axes = figure.add_subplot()
-    for name, values in curves.items():
+    for k, (name, values) in enumerate(curves.items()):
         for (bearing, series), (c, marker, line) in zip(values.items(), BEARINGS * len(values), strict=False):
-            axes.plot(temperature, series, color=c, marker=marker, linestyle=line, label=bearing, clip_on=False)
+            axes.plot(temperature, series, color=c, marker=marker, linestyle=line, label=bearing, clip_on=False, mfc="white" if k else c)
         if len(curves) > 1:
             highest = max(series[0] for series in values.values())
-            axes.annotate(name, (temperature[0], highest), (2, 6), textcoords="offset points", fontsize=8.5)
+            axes.annotate(f"{name}, open marks" if k else name, (temperature[0], highest), (2, 6), textcoords="offset points", fontsize=8.5)
     axes.set(xlabel="temperature, °C", ylabel=label)
     axes.margins(x=0.06, y=0.12)
     axes.ticklabel_format(useOffset=False)

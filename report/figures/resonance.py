@@ -176,7 +176,7 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = Fal
 
 
 def runout(found: ResonanceMap) -> Figure:
-    """Nonrepeatable runout of the linear response along temperature and along speed, with the coincidences passed on the way."""
+    """Nonrepeatable runout of the linear response along temperature and along speed, with the coincidences passed on the way; not at rest, where there is none, for it does not grow from 0."""
     figure = Figure(figsize=(9.6, 4.4))
     left, right = figure.subplots(1, 2)
     t_nominal, n_nominal = found.nominal.temperature, found.nominal.speed / RPM
@@ -184,7 +184,7 @@ def runout(found: ResonanceMap) -> Figure:
     at_temperature = [c for c in found.coincidences if abs(c.condition.temperature - t_nominal) < 1e-6]
     panels = (
         (left, found.nrro_temperature, 1.0, at_speed, lambda c: c.condition.temperature, f"temperature at {n_nominal:.0f} rpm, °C"),
-        (right, found.nrro_speed, 1 / RPM, at_temperature, lambda c: c.condition.speed / RPM, f"speed at {t_nominal:g} °C, rpm"),
+        (right, found.nrro_speed[found.nrro_speed[:, 0] > 0], 1 / RPM, at_temperature, lambda c: c.condition.speed / RPM, f"speed at {t_nominal:g} °C, rpm"),
     )
     names, paints = ("radial", "axial"), ("#7a3d8f", "#a0741a")
     for axes, along, unit, crossed, place, label in panels:

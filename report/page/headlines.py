@@ -44,7 +44,8 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
     for (name, by), numbers in groups.items():
         shifts = [f"{s[0]:+z.1f}" if (s := table.shift("computed", n)) else "gone" for n in numbers]  # as where bearings have lost contact
         modes = f"Mode{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
-        cards.append((f"{modes}: {name}, {by}", ", ".join(shifts) + " Hz" if set(shifts) != {"gone"} else "gone", f"computed shift from {cold:g} to {hot:g} °C"))
+        alike = {frozenset(["gone"]): "gone", frozenset(["+0.0"]): "less than 0.05 Hz"}.get(frozenset(shifts))
+        cards.append((f"{modes}: {name}, {by}", alike or f"{', '.join(shifts)} Hz", f"computed shift from {cold:g} to {hot:g} °C"))
     return cards
 
 
@@ -60,6 +61,8 @@ def _preload_change(of: Sequence[tuple[float, float]], cold: float, hot: float, 
     if np.ptp(of, axis=0).max() >= SAME:
         return "Preload", " / ".join(f"{a:z.0f}\u00a0→\u00a0{b:z.0f}" for a, b in of) + " N", f"{names}, from {cold:g} to {hot:g} °C"
     before, after = of[0]
+    if before and abs(after - before) < SAME:  # as springs hold it
+        return "Preload", f"{before:z.1f} N", f"the same at {cold:g} and {hot:g} °C"
     told = f"none at {cold:g} °C" if not before else f"{100 * after / before:z.0f} % of it is left at {hot:g} °C" if after < before else f"{_change(before, after)} at {hot:g} °C"
     return "Preload", f"{before:z.1f} → {after:z.1f} N", told
 

@@ -204,8 +204,7 @@ def show_map(console: Console, found: ResonanceMap) -> None:
     for said in [*told(found), mapped(found)]:
         console.print(said, highlight=False)
     if not found.coincidences:
-        names = [*dict.fromkeys(_named(t.line) for t in found.lines)]
-        console.print(f"Lines on the map: {listed(names) or 'none'}; of {_whose(found)}.", highlight=False)
+        console.print(on_the_map(found), highlight=False)
         return
     console.print()
     title = f"Coincidences from {found.temperatures[0]:g} to {found.temperatures[-1]:g} C, {found.speeds[0] / RPM:g} to {found.speeds[-1] / RPM:g} rpm, strongest first"
@@ -224,6 +223,12 @@ def show_map(console: Console, found: ResonanceMap) -> None:
             f"interpolated too: frequencies are off by {100 * i.frequency_error:.2g} % at most, strengths by {100 * i.largest_strength_error:.2g} %.",
             highlight=False,
         )
+
+
+def on_the_map(found: ResonanceMap) -> str:
+    """What stands in place of a table of coincidences where there are none."""
+    names = [*dict.fromkeys(_named(t.line) for t in found.lines)]
+    return f"Lines on the map: {listed(names) or 'none'}; of {_whose(found)}."
 
 
 def _whose(found: ResonanceMap) -> str:
@@ -264,9 +269,10 @@ def write_map(found: ResonanceMap, folder: Path) -> None:
 
 def map_section(found: ResonanceMap) -> tuple[str, str]:
     """Title and HTML of a report section."""
-    said = "".join(f"<p>{prose(s)}</p>" for s in [*told(found), mapped(found)])
+    met = strongest(found.coincidences)[:SHOWN]
+    said = "".join(f"<p>{prose(s)}</p>" for s in [*told(found), mapped(found), *([] if met else [on_the_map(found)])])
     head = ("line", "wave and order", "bearing", "mode", "°C", "rpm", "Hz", "strength, nm", "NRRO (nonrepeatable runout), nm rms", "margin, %")
-    grid = table(head, [[prose(cell) for cell in _cells(c)] for c in strongest(found.coincidences)[:SHOWN]], range(4))
+    grid = table(head, [[prose(cell) for cell in _cells(c)] for c in met], range(4)) if met else ""
     from thermospindle.report.figures.common import svg
     from thermospindle.report.figures.resonance import figures
 

@@ -16,8 +16,9 @@ from rich.console import Console
 
 from thermospindle.diagnosis.fleet import Fleet, apart
 from thermospindle.model import sense
+from thermospindle.model.errors import listed
 from thermospindle.model.files.formats import SCENE
-from thermospindle.model.machine import Condition
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import content_hash, scene_path
 from thermospindle.model.units import RPM
@@ -32,7 +33,7 @@ from thermospindle.report.text.grid import show_grid
 from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.study.comparison import Designs, comparison, designs
 from thermospindle.sim.study.executors import Executor, on_cluster, on_this_machine
-from thermospindle.sim.study.form import COMPARISON, FLEET, MONTE_CARLO, read_study
+from thermospindle.sim.study.form import COMPARISON, FLEET, MONTE_CARLO, Study, read_study
 from thermospindle.sim.study.parts import RESULTS, fill, opened, versions, write, write_table
 from thermospindle.sim.study.rows import Cases, cases
 from thermospindle.sim.study.sensitivity import APART
@@ -58,7 +59,7 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
         raw = read_file(SCENE, scene)
         check(asked, raw, scene, spindle, catalogue)
         of = cases(asked, raw, scene, spindle, catalogue)
-    doubts = [] if asked.kind == FLEET else sense.of_conditions(spindle, [Condition(t, n * RPM) for t in asked.temperatures or spindle.temperatures for n in (min(asked.speeds), max(asked.speeds))])
+    doubts = [] if asked.kind == FLEET else _doubts(asked, spindles)
     scenes = ", ".join(s.name for s in spindles)
     place = Path("out") / asked.file.stem if out is None else Path(out)
     key: dict[str, Any] = {"study": asked.digest, "scene": content_hash(spindle), "effects": [digest(Path(f)) for f in effect_files]}
@@ -85,6 +86,16 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
         console.print(f"\n{place}: {RESULTS}, {SUMMARY}, {LOG}, {', '.join(f'{name}.png' for name in drawn)}", soft_wrap=True)
 
     return Answer(values, show)
+
+
+def _doubts(asked: Study, spindles: Sequence[Spindle]) -> list[str]:
+    """What is doubtful about the conditions of a study: a sentence that every design would say is said once, any other with the name of its design."""
+    said: dict[str, list[str]] = {}
+    for name, spindle in zip(asked.designs or (spindles[0].name,), spindles, strict=True):
+        conditions = [Condition(t, n * RPM) for t in asked.temperatures or spindle.temperatures for n in (min(asked.speeds), max(asked.speeds))]
+        for sentence in sense.of_conditions(spindle, conditions):
+            said.setdefault(sentence, []).append(name)
+    return [sentence if len(names) == len(spindles) else f"{listed(names)}: {sentence}" for sentence, names in said.items()]
 
 
 @contextmanager

@@ -33,6 +33,7 @@ NAMED = (BadInput, OutsideRange, NoEquilibrium, NotConverged)
 OF_ROW = {"preload_N": "preload", "contact_angle_deg": "contact_angle", "deformation_um": "deformation"}
 OF_BEARING = {"radial_stiffness_N_per_m": "radial_stiffness", "axial_stiffness_N_per_m": "axial_stiffness"}
 OF_RUNOUT = ("rro_um", "nrro_six_sigma_um")  # peak to valley, and six standard deviations
+NONREPEATABLE = OF_RUNOUT[1]
 STIFFNESS = "stiffness_N_per_um"
 UNITS = {"contact_angle_deg": np.degrees(1.0), "deformation_um": 1e6}
 MODES = {"frequency_Hz": pa.float64(), "damping_ratio": pa.float64(), "kind": pa.string(), "whirl": pa.string(), "mode": pa.int64()}

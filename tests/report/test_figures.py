@@ -124,6 +124,16 @@ def test_a_level_curve_has_no_offset_axis():
     assert len([t for t in ticks if 24 < t < 26]) >= 3
 
 
+def test_two_quantities_of_one_bearing_are_told_apart_by_their_marks(monkeypatch):
+    """In `tailstock` the radial stiffness of one row begins where the axial one of three others does, and both were drawn alike."""
+    drawn = []
+    monkeypatch.setattr(plots, "svg", lambda figure, *_: drawn.append(figure) or "")
+    plots.trend("stiffness", [20.0, 60.0], {"radial": {"a": [90.0, 95.0], "b": [128.6, 147.9]}, "axial": {"a": [128.4, 132.9], "b": [187.0, 213.7]}}, "stiffness, N/µm", True)
+    axes = drawn[0].axes[0]
+    assert [line.get_markerfacecolor() == line.get_color() for line in axes.get_lines()] == [True, True, False, False]
+    assert [text.get_text() for text in axes.texts] == ["radial", "axial, open marks"]
+
+
 @pytest.mark.parametrize(
     ("values", "least", "ends"),
     [

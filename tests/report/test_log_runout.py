@@ -15,6 +15,7 @@ from matplotlib.projections.polar import PolarAxes
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
+from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import row_kinematics
 from thermospindle.model.built.imperfections import Imperfections
@@ -77,6 +78,17 @@ def test_the_summary_names_every_bearing_that_has_a_part_in_a_line(record):
     shared = next(g for g in record.lines[:16] if len({c.bearing for c in g.causes}) > 1)
     names = ", ".join(dict.fromkeys(c.bearing for c in shared.causes if c.bearing))
     assert f"| {shared.causes[0].name} | {names} {shared.causes[0].cause} |" in summary(record)
+
+
+def test_the_summary_speaks_of_the_part_that_is_looked_at():
+    """A shaft was called a hub, as the disk drive has one; and of a scene without imperfections the head of a table stood over no line."""
+    point = operating_point(load(ROOT / "tests" / "scenes" / "inner_turning_spring"), Condition(20.0, SPEED))
+    told = summary(runout(point, 0.1, path="linear"))
+    assert "| shaft x | " in told
+    assert "| shaft axial | " in told
+    assert "hub" not in told
+    assert "No line: nothing moves." in told
+    assert "Strongest lines" not in told
 
 
 def test_a_logged_value_costs_at_most_25_bytes(record, file, tmp_path):

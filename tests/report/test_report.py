@@ -13,12 +13,14 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.made_campaign import other_campaign
+from tests.model.test_loaded import rollers
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import group_energy
 from thermospindle.model.scene.reading import content_hash, load
-from thermospindle.report.page.comparison import Table, compared
+from thermospindle.report.figures.report import Peaks
+from thermospindle.report.page.comparison import Row, Table, compared
 from thermospindle.report.page.headlines import headlines, misses
-from thermospindle.report.page.report import background, html, named, stamp, write_report
+from thermospindle.report.page.report import _page, background, bearing_figures, html, named, stamp, write_report
 from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.hammer.test import estimate_of
 from thermospindle.sim.operating import operating_point
@@ -161,6 +163,15 @@ def test_bearing_table(run: Run, page: Page):
         exact = [np.degrees(b.contact_angle), b.deformation * 1e6, b.contact_force, b.ball_stiffness * 1e-6]
         exact += [b.preload, b.radial_stiffness * 1e-6, b.axial_stiffness * 1e-6]
         assert [number(c) for c in row[2:9]] == pytest.approx(exact, abs=0.000501)
+
+
+def test_a_machine_on_rollers_alone_has_no_empty_table_of_balls():
+    """It had the head of one, over no row, and then "The same of rollers"."""
+    spindle = rollers()
+    few = SimpleNamespace(spindle=spindle, steps=[SimpleNamespace(point=operating_point(spindle, Condition(20.0)))])
+    found = Page(str(_page().bearings(bearing_figures(few), few)))
+    assert list(found.tables) == ["rollers"]
+    assert [row[1] for row in found.tables["rollers"][1:]] == [b.name for b in spindle.roller_bearings]
 
 
 def test_mode_table(run: Run, page: Page):
@@ -330,3 +341,13 @@ def test_headlines_of_scenes_with_and_without_ball_rows(scene: str, cards: int) 
     assert len(headlines(SimpleNamespace(steps=steps), table)) == cards  # type: ignore[arg-type]
     none = [SimpleNamespace(point=replace(s.point, state=replace(s.point.state, bearings=tuple(replace(b, preload=0.0) for b in s.point.state.bearings)))) for s in steps]
     assert all("0.0 → 0.0 N" in number for what, number, _ in headlines(SimpleNamespace(steps=none), table) if what == "Preload")  # type: ignore[arg-type]
+
+
+def test_what_temperature_leaves_alone_is_not_a_row_of_zeros() -> None:
+    """A spring's preload was "16.0 → 16.0 N, 100 % of it is left", and seven modes on bearings given by numbers "+0.0, +0.0, +0.0, ... Hz"."""
+    steps = [SimpleNamespace(point=operating_point(load(ROOT / "tests" / "scenes" / "inner_turning_spring"), Condition(t))) for t in (20.0, 60.0)]
+    rows = tuple(Row(n, "lateral", name, 0.8, 0.2, "") for n, name in enumerate(("feet", "feet", "shaft"), 1))
+    peaks = tuple(Peaks("computed", "computed", t, {1: (548.84, np.nan), 2: (583.73 - 1e-4 * t, np.nan), 3: (900.0 - t, np.nan)}) for t in (20.0, 60.0))
+    cards = headlines(SimpleNamespace(steps=steps), Table(rows, peaks, (20.0, 60.0), {}, ()))  # type: ignore[arg-type]
+    assert cards[0] == ("Preload", "16.0 N", "the same at 20 and 60 °C")
+    assert [number for _, number, _ in cards[-2:]] == ["less than 0.05 Hz", "-40.0 Hz"]

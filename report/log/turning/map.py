@@ -23,7 +23,7 @@ from thermospindle.report.log.content import made_from
 from thermospindle.report.log.drawing import light
 from thermospindle.report.log.pictures import log_figure, log_figures, place, view
 from thermospindle.report.log.views import at, axis, summary_view, window
-from thermospindle.report.text.resonance import map_json, mapped, told
+from thermospindle.report.text.resonance import map_json, mapped, on_the_map, told
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.found import ResonanceMap, strongest
 
@@ -108,13 +108,10 @@ def log_series(recording: rr.RecordingStream, found: ResonanceMap) -> None:
 
 def summary(found: ResonanceMap) -> str:
     """Markdown: what is crossed at the nominal speed, and the strongest coincidences."""
-    lines = [
-        *(f"{s}\n" for s in told(found)),
-        f"{mapped(found)}\n",
-        "| line | cause | mode | °C | rpm | Hz | nm | margin % |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for c in strongest(found.coincidences)[:16]:
+    met = strongest(found.coincidences)[:16]
+    lines = [*(f"{s}\n" for s in told(found)), f"{mapped(found)}\n"]
+    lines += ["| line | cause | mode | °C | rpm | Hz | nm | margin % |", "|---|---|---|---|---|---|---|---|"] if met else [f"{on_the_map(found)}\n"]
+    for c in met:
         numbers = f"{c.condition.temperature:.1f} | {c.condition.speed / RPM:.0f} | {c.frequency:.0f} | {1e9 * c.strength:.1f} | {100 * c.margin:+z.1f}"
         lines.append(f"| {c.line.name} | {c.line.cause} {c.line.bearing} | {c.mode.number} {c.mode.kind} | {numbers} |")
     return "\n".join([*lines, *made_from(found.spindle)]) + "\n"

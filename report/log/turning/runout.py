@@ -159,18 +159,19 @@ def log_waterfall(recording: rr.RecordingStream, spectra: Sequence[LineSpectrum]
 
 def summary(runout: Runout) -> str:
     """Markdown: what is quoted, and the strongest lines."""
-    condition, values = runout.point.condition, runout.values()
-    of_what = "" if abs(runout.ratios[0]) == 1 else f" of the {looked_at(runout.point.spindle)}"
+    condition, where = runout.point.condition, looked_at(runout.point.spindle)
+    of_what = "" if abs(runout.ratios[0]) == 1 else f" of the {where}"
+    shown = {X: f"{where} x", Y: f"{where} y", AXIAL: f"{where} axial"}
     lines = [
         f"**{condition.temperature:g} °C, {condition.speed / RPM:.6g} rpm, {runout.averaged.count} revolutions{of_what}**",
         "",
         "| nm | RRO | NRRO | 6σ NRRO | synchr. | asynchr. |",
         "|---|---|---|---|---|---|",
     ]
-    for name, m in values.items():
+    for name, m in runout.values().items():
         row = (m.repeatable, m.nonrepeatable, m.six_sigma, m.synchronous_error, m.asynchronous_error)
-        lines.append(f"| {name} | " + " | ".join(f"{TO_NM * v:.1f}" for v in row) + " |")
-    lines += ["", "Strongest lines:", "", "| Hz | | nm | line | cause |", "|---|---|---|---|---|"]
+        lines.append(f"| {shown.get(name, name)} | " + " | ".join(f"{TO_NM * v:.1f}" for v in row) + " |")
+    lines += ["", "Strongest lines:", "", "| Hz | | nm | line | cause |", "|---|---|---|---|---|"] if runout.lines else ["", "No line: nothing moves."]
     for g in runout.lines[:16]:
         cause = f"{', '.join(dict.fromkeys(c.bearing for c in g.causes if c.bearing))} {g.causes[0].cause}".strip() if g.causes else "unexplained"
         name = g.causes[0].name if g.causes else ""

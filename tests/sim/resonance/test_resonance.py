@@ -20,7 +20,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.resonance import figures
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe, log_json
-from thermospindle.report.log.turning.map import write_map_log
+from thermospindle.report.log.turning.map import summary, write_map_log
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import strongest
@@ -167,6 +167,13 @@ def test_where_all_runout_repeats_a_sentence_stands_for_its_figure(met):
     assert "All runout" not in map_section(met)[1]
 
 
+def test_runout_over_speed_begins_where_the_spindle_turns(found):
+    """At rest there is none, and at the slowest speed it is that of balls that pass waves: a ramp was drawn from 0 to it, which is not there."""
+    assert found.nrro_speed[0].tolist() == [0.0, 0.0, 0.0]
+    drawn = figures(found)["nrro"].axes[1].lines[0].get_xydata()
+    assert drawn[0] == pytest.approx(found.nrro_speed[1, :2] * [1 / RPM, 1e9])
+
+
 def test_a_sentence_tells_what_was_mapped(spindle, found):
     """One number for --speeds is one speed, beside the nominal one, and no end of a range."""
     assert mapped(found) == "Mapped at 9 temperatures from 20 to 60 C, and at 17 speeds from 0 to 14400 rpm; the nominal 20 C and 7200 rpm are always among them."
@@ -182,6 +189,10 @@ def test_a_sentence_tells_what_was_mapped(spindle, found):
     assert "Lines on the map: " in (text := console.export_text())
     assert one.lines[0].line.name in text
     assert "of the scene's imperfections" in text if one.drawn_from is None else f"(seed {one.drawn_from}; the scene names none)" in text
+    for shown in (map_section(none)[1], summary(none)):  # the head of a table stood over no row, in the report and in the log
+        assert "Lines on the map: " in shown
+        assert "margin" not in shown
+    assert "Lines on the map" not in map_section(one)[1]
 
 
 def test_help_says_which_speeds_are_mapped(capsys):
