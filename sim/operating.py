@@ -14,9 +14,9 @@ import scipy
 
 from thermospindle.model import sense
 from thermospindle.model.bearing.pair import PairState, solve
-from thermospindle.model.bearing.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.files.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.pressure import pressures
 from thermospindle.model.rotor import mjcf

@@ -13,8 +13,8 @@ import pytest
 from tests.command_line import changed_scene, refused
 from tests.conftest import ROOT, SCENE
 from thermospindle.cli import main
-from thermospindle.model.bearing.stiffness_table import read_table
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.stiffness_table import read_table
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import modes as modes_of

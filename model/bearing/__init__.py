@@ -15,8 +15,6 @@ roller           cylindrical roller rows: line contacts in slices, clearance tha
 row              a ball row where its rings are at a temperature
 springs          balls as springs between points of two bodies: what a ball-by-ball bearing element is made of
 state            what a bearing is to the rotor: stiffness and damping, with names for their entries
-stiffness_table  the stiffness table: bearing properties over temperature and speed, as a CSV with units in its header
-                 and its provenance above
 catalogue        spindle bearings as their catalogues print them: preload, unloading force and rigidity of a pair
 ===============  =======================================================================================================
 """

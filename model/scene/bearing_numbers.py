@@ -10,8 +10,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from thermospindle.model.bearing import stiffness_table
 from thermospindle.model.errors import BadInput, absent
+from thermospindle.model.files import stiffness_table
 from thermospindle.model.files.cells import plain_number
 from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table, meant
 from thermospindle.model.units import RPM

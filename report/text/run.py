@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
-from thermospindle.model.bearing.stiffness_table import write_table
+from thermospindle.model.files.stiffness_table import write_table
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy

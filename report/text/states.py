@@ -11,8 +11,8 @@ from rich.console import Console
 
 from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.bearing.state import ALIKE
-from thermospindle.model.bearing.stiffness_table import BETWEEN, FURTHER, PRESSURE, StiffnessTable
 from thermospindle.model.errors import listed
+from thermospindle.model.files.stiffness_table import BETWEEN, FURTHER, PRESSURE, StiffnessTable
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from thermospindle.model import sense
-from thermospindle.model.bearing.stiffness_table import StiffnessTable, write_table
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.stiffness_table import StiffnessTable, write_table
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor import static as statics
 from thermospindle.model.rotor.beam import with_theory

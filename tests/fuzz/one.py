@@ -15,7 +15,7 @@ import atheris
 ROOT = Path(__file__).parents[2]
 LIBRARIES = ["pyuff", "tomllib", "zipfile"]
 OURS = (
-    "model.files", "model.scene", "model.bearing.stiffness_table", "sim.campaign", "sim.importing", "sim.identification.frf", "sim.study.form",
+    "model.files", "model.scene", "model.files.stiffness_table", "sim.campaign", "sim.importing", "sim.identification.frf", "sim.study.form",
     "sim.study.parts", "diagnosis.answer", "diagnosis.draft.answer", "diagnosis.draft.draft", "diagnosis.prediction.outcomes", "report.log.read",
 )  # fmt: skip
 """Modules whose branches count as coverage: those that read. All of them would take a minute to prepare; what is compiled has none to show."""

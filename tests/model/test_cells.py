@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from thermospindle.model.bearing.stiffness_table import read_table, write_table
 from thermospindle.model.files.cells import FORMULA, cell, cells, name_of
+from thermospindle.model.files.stiffness_table import read_table, write_table
 from thermospindle.sim.operating import stiffness_table
 
 NAMES = ["upper", "=1+1", "+x", "-x", "@SUM(A1)", "\t=1", "\r=1", "'upper", "'=1+1", "''@x", "a=b", "", "'"]

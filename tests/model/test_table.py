@@ -9,8 +9,8 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.ball_row import respond
-from thermospindle.model.bearing.stiffness_table import BETWEEN, BY_DIRECTION, COLUMNS, read_table, write_table
 from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.files.stiffness_table import BETWEEN, BY_DIRECTION, COLUMNS, read_table, write_table
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.bearing_numbers import Numbers
 from thermospindle.model.scene.reading import build, load

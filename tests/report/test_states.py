@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from thermospindle.model.bearing.pair import IN_CONTACT
-from thermospindle.model.bearing.stiffness_table import StiffnessTable
+from thermospindle.model.files.stiffness_table import StiffnessTable
 from thermospindle.model.units import RPM
 from thermospindle.report.text.states import of_bearings, show_told_table
 

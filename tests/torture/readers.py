@@ -38,8 +38,8 @@ from tests.torture.wholes import (
 from thermospindle.diagnosis.answer import read_answer
 from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.diagnosis.prediction.outcomes import outcomes
-from thermospindle.model.bearing.stiffness_table import read_table
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.stiffness_table import read_table
 from thermospindle.model.scene.bearing_numbers import Numbers
 from thermospindle.model.scene.reading import load
 from thermospindle.report.log.read import check_readable, read_log

@@ -19,8 +19,8 @@ from scipy.io import savemat
 from tests.conftest import DATA, ROOT, SCENE
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.row import reference_motion
-from thermospindle.model.bearing.stiffness_table import tabulate, write_table
 from thermospindle.model.files import kept as store
+from thermospindle.model.files.stiffness_table import tabulate, write_table
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.campaign.campaign import read_campaign
