@@ -123,6 +123,17 @@ def test_warm_up_tells_whose_preload_and_watts(capsys: pytest.CaptureFixture[str
     assert " mW" not in said
 
 
+@pytest.mark.parametrize("rpm", [8000, 12000])
+def test_five_bearings_warm_up_to_a_steady_state(rpm: int, capsys: pytest.CaptureFixture[str]) -> None:
+    """Since friction goes by Harris' load, rigid preloads ran away at the scene's own speed, and only a slow test would have told."""
+    assert main(["warmup", FIVE, "--speed", str(rpm), "--minutes", "0.05", "--json"]) == 0
+    steady = json.loads(capsys.readouterr().out)["steady"]
+    assert steady["load_feedback"] < 0.8
+    ring = steady["temperature_C"]
+    for name in ("front1", "front2", "front3", "rear1", "rear2"):
+        assert -2.0 < ring[f"{name} inner ring"] - ring[f"{name} outer ring"] < 10.0
+
+
 def test_a_spindle_on_one_bearing_is_free_to_tilt(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (Path(MK) / "spindle.toml").read_text(encoding="utf-8")
     tables = re.sub(r"^\[bearings\.(front2|front3|rear1)(\.numbers)?\].*?(?=^\[|^# -)", "", text, flags=re.DOTALL | re.MULTILINE)
