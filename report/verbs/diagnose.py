@@ -29,6 +29,7 @@ from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, sh
 from thermospindle.report.verbs.answer import Answer, answered, check_out, with_effects, write_json
 from thermospindle.sim.campaign.beside import doubtful, left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
+from thermospindle.sim.effects import CATALOGUE
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.own import effect_of
 
@@ -117,7 +118,9 @@ def draft(diagnosis: Path, name: str | None = None, element: str | None = None, 
     warnings = [written.fits] if written.doubt else []
     if written.named and element is None:
         names = " and ".join(written.named)
-        adding = f"spindle add SCENE {' '.join(written.named)} --from {shlex.quote(str(diagnosis))} --out NEW_SCENE"
+        shipped = {effect.name for effect in CATALOGUE}
+        files = "".join(f" --effect {one}.py" for one in written.named if one not in shipped)  # of the user's own, wherever it is
+        adding = f"spindle add SCENE {' '.join(written.named)}{files} --from {shlex.quote(str(diagnosis))} --out NEW_SCENE"
         warnings.append(f"{diagnosis} names {names}, and nothing has to be drafted: {adding}; this draft is of {written.element}, which would have to drift instead")
     fitted = f" --from {shlex.quote(str(diagnosis))}" if written.with_build else ""
     values = {"effect": called, "file": str(out), "equation": effect.equation, "parameters": effect.typical(), "warnings": warnings}

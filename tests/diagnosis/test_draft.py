@@ -106,6 +106,9 @@ def test_what_is_named_needs_no_draft(tmp_path, capsys):
         assert main(["draft", str(answer), "--out", str(tmp_path / f"own_{warned}.py"), "--json", *asked]) == 0
         said = json.loads(capsys.readouterr().out)["warnings"]
         assert any("names bond_softening, and nothing has to be drafted: spindle add SCENE bond_softening --from" in w for w in said) == warned
+    answer.write_text(json.dumps(told | {"verdict": "identified", "effects": ["air_film"]}), encoding="utf-8")
+    assert main(["draft", str(answer), "--out", str(tmp_path / "film.py"), "--json"]) == 0
+    assert "spindle add SCENE air_film --effect air_film.py --from" in capsys.readouterr().out  # of the user's own: `add` asks for its file
 
 
 STEEP, SLIGHT = [0.5 + np.exp((t - 70) / 4) for t in AT], [3 + 0.02 * (t - 20) / 50 for t in AT]
