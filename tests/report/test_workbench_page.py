@@ -253,7 +253,7 @@ def test_the_fit_to_the_lines_is_that_of_diagnose(tmp_path):
     page.controls.add.value = "bond_softening"
     page.weigh._trigger_event(click(page.weigh))
     finish(page, 600)
-    assert page.message.text.startswith("<p>Fitted to the lines, as spindle diagnose does. bond_softening.hot_compliance 12.")
+    assert page.message.text.startswith("<p>Fitted to the lines, as spindle diagnose does. bond_softening.hot_compliance 11.")
     gain = float(re.search(r"ln evidence \+(\d+)", page.message.text)[1])
     asked = told.find(bench, Setting(), lambda done: None)
     assert asked.rows[0].delta_evidence == pytest.approx(gain, rel=0.02)
