@@ -5,35 +5,19 @@ from __future__ import annotations
 import json
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from tests.conftest import ROOT
+from tests.report.checked import SCENES, checked, without
 from thermospindle.cli import main
 from thermospindle.model.machine import Condition
-from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.scene.reading import load
-from thermospindle.model.units import RPM
 from thermospindle.report.check.drawing import drawing
-from thermospindle.report.check.looked import looked
-from thermospindle.report.check.odd import odd
 from thermospindle.report.check.understood import arrangement
 from thermospindle.report.check.words import of_words
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.critical import criticals
-from thermospindle.sim.running.excitation import harmonics, response
-
-SCENES = {name: ROOT / "scenes" / name / "spindle.toml" for name in ("hdd_2003", "mk7702", "five_bearing", "free_shaft")}
-SCENES |= {kind: ROOT / "scenes" / "templates" / f"{kind}.toml" for kind in ("hdd", "machine-tool", "grinding", "rotor")}
-
-
-def checked(scene: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
-    assert main(["check", str(scene), "--json"]) == 0
-    found: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return found
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -174,82 +158,6 @@ def test_columns_with_dashes_are_of_numbers_and_an_empty_list_says_so(capsys: py
     assert "Assumed, where the scene says nothing:\n  - nothing" in capsys.readouterr().out
 
 
-ODD = [
-    ("five_bearing", "tip_stiffness_N_per_m = 3.0e7", "tip_stiffness_N_per_m = 3.0e6", "the hammer gives no force above 2615 Hz"),
-    ("five_bearing", "hammer_mass_g = 100.0", "hammer_mass_g = 10.0", "pulse of 57.4 us is shorter than a sample of 80 us"),
-    ("five_bearing", "hammer_mass_g = 100.0", "hammer_mass_g = 370.0", "less than a tenth of its force"),
-    ("five_bearing", "position_mm = [66.5, 0.0, 36.0]", "position_mm = [80.5, 0.0, 36.0]", "point flange: lies 14 mm off 'spindle'"),
-    ("hdd_2003", "position_mm = [12.5, 0.0, 15.0]", "position_mm = [15.5, 0.0, 15.0]", "point hub_side0: lies 3 mm off 'hub'"),
-    ("mk7702", "z_mm = 101.0", "z_mm = 81.0", "bearings front1 and front2 sit at the same place, z_mm = 81, between the same parts"),
-    ("mk7702", "damping_ratio = 0.015\norigins = { damping_ratio = \"assumed\", axial", "damping_ratio = 0.9\norigins = { damping_ratio = \"assumed\", axial", "of critical"),
-    ("five_bearing", "temperature_range_C = [20.0, 60.0]", "temperature_range_C = [20.0, 160.0]", "160 C lies outside"),
-    ("hdd_2003", "reference_temperature_C = 20.0", "reference_temperature_C = 295.0", "295 C lies outside -40 to 120 C"),
-    ("five_bearing", "nominal_speed_rpm = 8000.0", "nominal_speed_rpm = 40000.0", "means a speed factor n dm of 3.8e+06"),
-    ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [90, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 45 mm there"),
-    ("five_bearing", "band_Hz = [300.0, 4000.0]", "band_Hz = [1000.0, 4000.0]", "natural frequencies below the band"),
-    ("five_bearing", "record_length_s = 0.25", "record_length_s = 0.02", "has not died out when the record of 0.02 s ends"),
-    ("hdd", "thermal_expansion_um_per_m_K = 23.0", "thermal_expansion_um_per_m_K = 23.0e-6", "material aluminium: expands by 2.3e-05 um/m in a kelvin"),
-    ("hdd", "density_kg_per_m3 = 7800.0", "density_kg_per_m3 = 7.8", "material steel: has 7.8 kg/m3, less than any solid part"),
-    ("hdd", "preload_N = 16.0", "preload_N = 15.0", "at 60 C the preload is less than half that of the reference: lower 2."),
-    ("hdd", "contact_angle_deg = 24.5 ", "free_contact_angle_deg = 0.43 ", "free_contact_angle_deg = 0.43, of lower, upper: angular contact bearings have 12 to 40"),
-    ("hdd", "contact_angle_deg = 24.5 ", "contact_angle_deg = 80 ", "contact_angle_deg = 80, of lower, upper"),
-    ("rotor", "radial_stiffness_N_per_um = 20.0", "radial_stiffness_N_per_um = 20.0e-6", "bearing left: its radial stiffness is 20 N/m at most, on which the"),
-    ("free_shaft", "damping_ratio = 1.0e-4", "damping_ratio = 1.0e-9", "4 modes up to 1100 Hz are undamped"),
-    ("grinding", "outer_conformity = 0.53", "outer_conformity = 0.60", "the outer groove's radius is 0.6 ball diameters"),
-    ("machine-tool", "balls = 18\nball_diameter_mm = 10.32", "balls = 11\nball_diameter_mm = 10.32", "ball_rows.rear.catalogue, of rear1, rear2: preload, unloading force and axial rigidity ask for contacts 1.6 times as stiff as Hertz has them of 11 balls of 10.32 mm"),
-    ("machine-tool", "axial_rigidity_N_per_um = [64.5, 111.7, 162.8]", "axial_rigidity_N_per_um = [32.25, 55.85, 81.4]", "mm and grooves of a radius of 0.559 ball diameters, and bearings have 0.52 to 0.535"),
-    ("free_shaft", "[tolerances]", "[[effects]]\nname = \"preload_loss\"\n[tolerances]", "effect preload_loss: nothing to act on here"),
-    ("hdd_2003", 'between = ["seat", "shaft"]', 'between = ["hub", "shaft"]', "joint flange: 'hub' turns and 'shaft' does not"),
-    ("hdd", "preload_N = 16.0", "preload_N = 900.0", "under preload and the loads told; balls leave dents from 4200 MPa, the static limit of ISO 76"),
-    ("machine-tool", 'sprung_bearings = ["rear1", "rear2"]', 'sprung_bearings = ["rear1"]', "rear2 is loaded the same way as rear1, and only the latter on the spring"),
-    ("hdd", "reference_temperature_C = 20.0", "axial_load_N = 60.0\nreference_temperature_C = 20.0", "carries nothing at the reference temperature, at rest"),
-    ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
-    ("mk7702", "longest_element_mm = 20.0", "longest_element_mm = 90.0", "the shaft's elements are long for the band of the hammer test: the mode at"),
-    ("rotor", "outer_mm = [[30, 600]]", "outer_mm = [[30, 300], [150, 300]]", "its diameter jumps from 30 to 150 mm at z_mm = 300"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "right", "wrong", "sentence"), ODD, ids=[f"{o[0]} {o[3][:30]}" for o in ODD])
-def test_what_is_odd_is_said(name: str, right: str, wrong: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of the changed scene, and not of the one that it was."""
-    text = SCENES[name].read_text(encoding="utf-8")
-    assert right in text
-    (tmp_path / "spindle.toml").write_text(text.replace(right, wrong), encoding="utf-8")
-    assert any(sentence in words for words in checked(tmp_path, capsys)["odd"])
-    assert not any(sentence in words for words in checked(SCENES[name], capsys)["odd"])
-
-
-def test_an_angle_that_is_none_is_told_as_the_file_has_it(tmp_path: Path) -> None:
-    """The free angle that was typed, not the loaded one that follows; and of a spindle whose file is gone."""
-    text = SCENES["hdd"].read_text(encoding="utf-8")
-    told = text.replace("contact_angle_deg = 24.5 ", "free_contact_angle_deg = 2.5 ")
-    (tmp_path / "spindle.toml").write_text(told, encoding="utf-8")
-    spindle = load(tmp_path)
-    (tmp_path / "spindle.toml").unlink()
-    point = operating_point(spindle, Condition(20.0))
-    assert np.degrees(spindle.bearings[0].contact_angle) > 6.0
-    assert any("free_contact_angle_deg = 2.5, of lower, upper: angular contact" in words for words in odd(looked(spindle, point)))
-
-
-def test_a_spring_that_nothing_holds_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A floating bearing behind a rigid pair: its spring presses the pair only where no outer force holds it, and `axial_load_N` says so."""
-    text = SCENES["machine-tool"].read_text(encoding="utf-8").replace('z_mm = 60.0\nsense = "-z"', 'z_mm = 60.0\nsense = "+z"')
-    apart = 'bearings = ["front1", "front2"]\npreload_N = 900.0\npreload_kind = "rigid"\n\n[sets.behind]\norigin = "assumed"\nsource = "a floating end"\nbearings = ["rear1", "rear2"]'
-    floating = text.replace('bearings = ["front1", "front2", "rear1", "rear2"]', apart).replace("preload_N = 900.0                  #", "preload_N = 200.0 #")
-    floating = floating.replace("preload_rate_N_per_m = 1.0e6 ", "# preload_rate_N_per_m = 1.0e6 ").replace("sprung_ring_mass_g", "# sprung_ring_mass_g")
-    file = tmp_path / "spindle.toml"
-    file.write_text(floating, encoding="utf-8")
-    before = checked(file, capsys)
-    assert any("set behind: the 200 N of its spring are held from outside" in words and "axial_load_N = -200" in words for words in before["odd"])
-    assert before["bearings"]["front1"]["preload_N"] == pytest.approx(before["bearings"]["front2"]["preload_N"], rel=1e-9)
-
-    file.write_text("axial_load_N = -200.0\n" + floating, encoding="utf-8")
-    after = checked(file, capsys)
-    assert not any("set behind" in words for words in after["odd"])
-    assert after["bearings"]["front1"]["preload_N"] - after["bearings"]["front2"]["preload_N"] == pytest.approx(200.0, rel=1e-6)
-    assert after["bearings"]["rear1"]["preload_N"] == pytest.approx(100.0, rel=1e-9)
-
-
 def test_shares_of_a_radial_load_add_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = SCENES["five_bearing"].read_text(encoding="utf-8").replace("ball_inertia = 1.0", "ball_inertia = 1.0\nradial_load_N = [300.0, -100.0]\nradial_load_z_mm = 0.0")
     (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
@@ -263,32 +171,11 @@ def test_shares_of_a_radial_load_add_up(tmp_path: Path, capsys: pytest.CaptureFi
         assert "is for centred rings" in capsys.readouterr().err
 
 
-def test_what_moves_freely_and_what_is_constant_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    assert any("against 2 motions" in words for words in checked(SCENES["free_shaft"], capsys)["odd"])
-    assert any("constant numbers" in words for words in checked(SCENES["mk7702"], capsys)["odd"])
-    assert checked(SCENES["hdd_2003"], capsys)["odd"] == []
-
-
 def test_a_joint_that_differs_along_x_and_y_is_shown_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(SCENES["hdd"])]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("mount") and "1.2e+04, 1.4e+04" in line for line in lines)
     assert any(line.startswith("flange") and line.split()[-3:] == ["5e+07", "5e+06", "800"] for line in lines)
-
-
-def test_what_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "spindle.toml").write_text(SCENES["mk7702"].read_text(encoding="utf-8").replace("z_mm = 81.0", 'z_mm = "81"'), encoding="utf-8")
-    assert main(["check", str(tmp_path)]) == 2
-    assert "bearings.front1.z_mm = '81': input should be a valid number" in capsys.readouterr().err
-
-
-def without(text: str, *tables: str) -> str:
-    """A scene's text without some tables and what is in them."""
-    import re
-
-    for table in tables:
-        text = re.sub(rf"^\[+{table}(\.[^\]]*)?\]+.*?(?=^\[+(?!{table})|\Z)", "", text, flags=re.DOTALL | re.MULTILINE)
-    return text
 
 
 @pytest.mark.parametrize(
@@ -348,49 +235,6 @@ def test_bearings_given_by_numbers_bear_a_radial_load_by_the_lever_rule(tmp_path
     right = 10.0 * (400.0 - 30.0) / (570.0 - 30.0)
     assert found["left"] == pytest.approx([10.0 - right, 0.0], abs=1e-5)
     assert found["right"] == pytest.approx([right, 0.0], abs=1e-5)
-
-
-def critical_words(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
-    (folder / "spindle.toml").write_text(text, encoding="utf-8")
-    return [words for words in checked(folder, capsys)["odd"] if words.startswith("a natural frequency of")]
-
-
-def test_unbalance_is_told_to_drive_what_whirls_with_the_rotor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """In supports that are alike in all directions it does nothing to the backward mode at that speed; in others to both, each by its share."""
-    text = SCENES["rotor"].read_text(encoding="utf-8").replace("nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0")
-    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
-    point = operating_point(load(tmp_path), Condition(20.0, 7200 * RPM))
-    pair = [m for m in point.modes if abs(m.frequency / 120.0 - 1) < 0.05]
-    assert [m.whirl for m in pair] == ["backward", "forward"]
-    [told] = critical_words(text, tmp_path, capsys)
-    assert told.startswith(f"a natural frequency of {pair[1].frequency:.0f} Hz lies at the nominal speed of 7200 rpm and whirls with the rotor: unbalance drives it; 5 g mm of the scene at z = 225 mm")
-
-    apart = text.replace("radial_stiffness_N_per_um = 20.0   # in every direction across the axis\naxial_stiffness_N_per_um = 5.0 ", "matrix_SI = [[2e7, 0, 0, 0, 0], [0, 1.2e7, 0, 0, 0], [0, 0, 5e6, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 0]] ")
-    assert apart != text
-    both = critical_words(apart, tmp_path, capsys)
-    assert "whirls mostly against the rotor: unbalance drives it by 22 % of the modal force; 5 g mm of the scene" in both[0]
-    assert "whirls mostly with the rotor: unbalance drives it by 78 % of the modal force; 5 g mm of the scene" in both[1]
-    assert len(both) == 2
-
-
-def test_how_far_unbalance_moves_a_mode_is_what_the_running_rotor_does_there(tmp_path: Path) -> None:
-    """At the critical speed all other modes add little to the one."""
-    text = SCENES["rotor"].read_text(encoding="utf-8")
-    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
-    spindle = load(tmp_path)
-    speed = 7200 * RPM
-    for _ in range(6):  # to where the forward mode stands at the speed
-        point = operating_point(spindle, Condition(20.0, speed))
-        [found] = criticals(point, 0.05)
-        speed = 2 * np.pi * found.mode.frequency
-    row = motion_rows(point.chain, "disc", (0.0, 0.0, 0.225))[0]
-    assert found.of_scene
-    assert found.sense == pytest.approx(1.0, abs=1e-6)
-    assert found.moved == pytest.approx(float(np.abs(response(point, harmonics(point)) @ row)[0]), rel=0.01)
-
-
-def test_no_catalogue_of_the_shipped_bearings_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert not [words for words in checked(SCENES["five_bearing"], capsys)["odd"] if "catalogue" in words]
 
 
 @pytest.mark.parametrize("element", [65.0, 20.0, 5.0])
