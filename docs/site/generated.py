@@ -171,7 +171,7 @@ def command_line() -> str:
 
 THEORY = {
     "Expansion": ("thermal.elastic",),
-    "Ball and roller contact": ("model.bearing.hertz", "model.bearing.ball_row", "model.bearing.heavy_ball", "model.bearing.roller"),
+    "Ball and roller contact": ("model.bearing.hertz", "model.bearing.ball_row", "model.bearing.heavy_ball.balance", "model.bearing.roller"),
     "Equilibrium of the bearings": ("model.bearing.pair", "model.bearing.springs", "model.rotor.loaded"),
     "Rotor and base": ("model.rotor.chain", "model.rotor.beam", "model.rotor.modes"),
     "What excites a running spindle": ("model.bearing.kinematics", "sim.running.excitation"),

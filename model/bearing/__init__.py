@@ -4,7 +4,7 @@
 ball_row         one ball row: forces, contact loss and the exact 5x5 tangent stiffness under any load
 centred          a ball row with centred rings, all of whose balls are alike
 definitions      frozen definitions: a ball row, a bearing given by numbers, roller rows, sets that share a preload
-heavy_ball       one ball with inertia between its two races: where its centre settles, and the stiffness it shows the
+heavy_ball/      one ball with inertia between its two races: where its centre settles, and the stiffness it shows the
                  outer ring
 hertz            Hertz point contact with exact elliptic integrals
 kinematics       how fast cage and balls turn, and at which frequencies a running spindle is excited

@@ -5,7 +5,7 @@ K deformation**1.5 beyond the unloaded distance and none below (Jones 1960; Harr
 psi_j in its own r-z plane; the outer ring's displacement relative to the inner, (x, y, z, tilt_x, tilt_y), moves the outer
 centre there by u_r = x cos + y sin and u_z = z + arm (tilt_x sin - tilt_y cos). Forces are those needed on the outer ring.
 
-With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy_ball`), and so is the speed of the cage, with which all balls orbit: the mean of what rolling at the angles of
+With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy_ball.balance`), and so is the speed of the cage, with which all balls orbit: the mean of what rolling at the angles of
 each would make it. What one ring is pushed aside with the other is then, too.
 """
 
@@ -21,18 +21,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from thermospindle.model.bearing.heavy_ball import (
-    LEAST_STRETCH,
-    Balance,
-    BallInertia,
-    Driven,
-    HeavyBall,
-    Vector,
-    balance,
-    driven,
-    rolling,
-    settled,
-)
+from thermospindle.model.bearing.heavy_ball.balance import LEAST_STRETCH, Balance, Driven, HeavyBall, balance, driven, settled
+from thermospindle.model.bearing.heavy_ball.inertia import BallInertia, Vector, rolling
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from thermospindle.model.bearing.ball_row import BallRow, at_one_speed, kinematics_of, tolerances
-from thermospindle.model.bearing.heavy_ball import Vector, settled, spring
+from thermospindle.model.bearing.heavy_ball.balance import settled, spring
+from thermospindle.model.bearing.heavy_ball.inertia import Vector
 from thermospindle.model.types import Array
 
 Centres = dict[int, Vector]

@@ -16,7 +16,7 @@ import scipy
 
 from thermospindle.model.bearing.ball_row import BallRow
 from thermospindle.model.bearing.centred import Centres, centred, centred_axial_force
-from thermospindle.model.bearing.heavy_ball import Vector
+from thermospindle.model.bearing.heavy_ball.inertia import Vector
 from thermospindle.model.bearing.movement import Rings, Sleeve, equilibrium
 from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.row import row_at

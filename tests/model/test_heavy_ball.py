@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermospindle.model.bearing import heavy_ball
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centre_line, respond
 from thermospindle.model.bearing.centred import centred_axial_force
-from thermospindle.model.bearing.heavy_ball import HeavyBall, balance, settled
+from thermospindle.model.bearing.heavy_ball.balance import HeavyBall, balance, settled
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
@@ -109,7 +108,7 @@ def test_centred_rows_are_one_ball_many_times(monkeypatch):
     """Equal balls are settled once, answer alike, and the short way to the axial force gives that of `respond`."""
     row = BallRow(12, 1.0e-3, 0.86e-3, 0.6e-3, 0.7e-3, 8e9, 9e9, 60e-3, BALL.inertia)
     calls = []
-    monkeypatch.setattr("thermospindle.model.bearing.ball_row.settled", lambda *given: calls.append(given) or heavy_ball.settled(*given))
+    monkeypatch.setattr("thermospindle.model.bearing.ball_row.settled", lambda *given: calls.append(given) or settled(*given))
     for movement in (-5e-6, 0.0, 8e-6):
         calls.clear()
         answer = respond(replace(row, axial=row.axial + movement))

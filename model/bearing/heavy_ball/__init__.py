@@ -1,0 +1,7 @@
+"""One ball with inertia between its two races.
+
+=======  ====================================================================================================
+balance  where its centre settles, the stiffness it shows the outer ring, and what its cage drives
+inertia  how fast it orbits by rolling, its centrifugal force and its gyroscopic moment
+=======  ====================================================================================================
+"""
