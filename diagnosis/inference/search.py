@@ -15,6 +15,7 @@ from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, settled, widened
 from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, without_one
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import (
@@ -157,7 +158,7 @@ def _from_the_drawing(model: CampaignModel, h: Hypothesis) -> Hypothesis:
 
 def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Sequence[Mechanism], tried: Singles, workers: int | None) -> list[Hypothesis]:
     """The best explanation of the catalogue, and those that do nearly as well, with each of their effects acting in every other way that it has (the other bearing, the other ideal case of its
-    law): screening chose one, and what the data do not tell of that is not to be told as if they did. Not where one effect less does as well."""
+    law; by each law of its own where it has the data's): screening chose one, and what the data do not tell of that is not to be told as if they did. Not where one effect less does as well."""
     named = of_each_name([h for h in ranked if h.mechanisms and not h.free])
     best = max((h.evidence.ln for h in ranked), default=-np.inf)
     needed = [h for h in named if not any(set(o.names) < set(h.names) and o.evidence.ln > h.evidence.ln - GAINED[len(h.mechanisms)] for o in named)]
@@ -173,9 +174,11 @@ def _ways_of(model: CampaignModel, best: Hypothesis, every: Sequence[Mechanism],
     for k, (m, idle) in enumerate(zip(best.mechanisms, best.idle, strict=True)):
         sizes, after = at + len(model.tests), at + len(model.tests) + len(m.shape)
         least = promised.get(m.variant, -np.inf) - behind
-        others = [o for o in every if (o.name, o.kind) == (m.name, m.kind) and o.choices != m.choices and promised.get(o.variant, np.inf) > least]
+        others = [o for o in every if o.name == m.name and o.kind in (m.kind, "law") and o.variant != m.variant and promised.get(o.variant, np.inf) > least]
+        acts = best.evidence.sizes[k][np.abs(best.evidence.sizes[k] - m.size.neutral).argmax()]
         for o in [] if idle and beside else sorted(others, key=lambda o: -promised.get(o.variant, -np.inf))[:WAYS]:
-            start = np.concatenate([best.fit.point[:sizes], np.zeros(len(o.shape)), best.fit.point[after:]])
+            own = best.fit.point[at:sizes] if o.kind == m.kind else Problem(model, (o,)).start({0: acts})[len(model.parameters) :][: len(model.tests)]
+            start = np.concatenate([best.fit.point[:at], own, np.zeros(len(o.shape)), best.fit.point[after:]])
             tasks.append(Task((*best.mechanisms[:k], o, *best.mechanisms[k + 1 :]), (start,), -np.inf))
         at = after
     found = fitted(model, tasks, TEMPERS[-1:], best.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * PLENTY)
