@@ -24,18 +24,17 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
     cold, hot = table.temperatures
     first, last = (next(s.point.state for s in run.steps if temperature_of(s) == t) for t in (cold, hot))
     pairs = list(zip(first.bearings, last.bearings, strict=True))[::-1]
-    names = " / ".join(b.name for _, b in pairs) + " bearing"
+    names = [b.name for _, b in pairs]
     if cold == hot:
-        return [_preload([a.preload for a, _ in pairs], f"at {cold:g} °C", names)] if pairs else []
-    cards = []
+        return [_preload(names, [a.preload for a, _ in pairs], f"at {cold:g} °C")] if pairs else []
+    change, cards = f"from {cold:g} to {hot:g} °C", []
     if pairs:
-        angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+z.2f}" for a, b in pairs)
-        radial = " / ".join(_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs)
-        axial = " / ".join(_change(a.axial_stiffness, b.axial_stiffness) for a, b in pairs)
+        radial, which = _each(names, [_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs])
+        axial, _ = _each(names, [_change(a.axial_stiffness, b.axial_stiffness) for a, b in pairs])
         cards = [
-            _preload_change([(a.preload, b.preload) for a, b in pairs], cold, hot, names),
-            ("Contact angle", f"{angle} degrees", f"{names}, from {cold:g} to {hot:g} °C"),
-            ("Radial bearing stiffness", radial, f"{names}; axial {axial}"),
+            _preload_change(names, [(a.preload, b.preload) for a, b in pairs], cold, hot),
+            ("Contact angle", *_each(names, [f"{np.degrees(b.contact_angle - a.contact_angle):+z.2f}" for a, b in pairs], " degrees", change)),
+            ("Radial bearing stiffness", radial, f"{which or change}; axial {axial}"),
         ]
     groups: dict[tuple[str, str], list[int]] = {}
     for row in table.rows:
@@ -49,17 +48,24 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
     return cards
 
 
-def _preload(of: Sequence[float], at: str, names: str) -> tuple[str, str, str]:
+def _each(names: Sequence[str], numbers: Sequence[str], unit: str = "", when: str = "") -> tuple[str, str]:
+    """The number of every bearing, and an explanation that names the bearings in order; of more than two each stands beside its number."""
+    if len(names) > 2:
+        return ", ".join(f"{name}\u00a0{number}" for name, number in zip(names, numbers, strict=True)) + unit, when
+    return " / ".join(numbers) + unit, ", ".join(filter(None, [" / ".join(names) + " bearing", when]))
+
+
+def _preload(names: Sequence[str], of: Sequence[float], at: str) -> tuple[str, str, str]:
     """A card of the preload of every bearing, once where all have the same."""
     if max(of) - min(of) < SAME:
         return "Preload", f"{of[0]:.1f} N", at
-    return "Preload", " / ".join(f"{n:z.0f}" for n in of) + " N", f"{names}, {at}"
+    return "Preload", *_each(names, [f"{n:z.0f}" for n in of], " N", at)
 
 
-def _preload_change(of: Sequence[tuple[float, float]], cold: float, hot: float, names: str) -> tuple[str, str, str]:
+def _preload_change(names: Sequence[str], of: Sequence[tuple[float, float]], cold: float, hot: float) -> tuple[str, str, str]:
     """A card of what becomes of it (before, after), once where all have the same."""
     if np.ptp(of, axis=0).max() >= SAME:
-        return "Preload", " / ".join(f"{a:z.0f}\u00a0→\u00a0{b:z.0f}" for a, b in of) + " N", f"{names}, from {cold:g} to {hot:g} °C"
+        return "Preload", *_each(names, [f"{a:z.0f}\u00a0→\u00a0{b:z.0f}" for a, b in of], " N", f"from {cold:g} to {hot:g} °C")
     before, after = of[0]
     if before and abs(after - before) < SAME:  # as springs hold it
         return "Preload", f"{before:z.1f} N", f"the same at {cold:g} and {hot:g} °C"

@@ -265,9 +265,9 @@ def test_changed_spindle_is_told(run: Run):
     assert "differs from its file" in said["Where the numbers come from"]
 
 
-@pytest.mark.parametrize(("scene", "told"), [("hdd_2003", "16.0 → "), ("five_bearing", "211 → 238 / 211 → 638 / 382 → 926 / 191 → 292 / 191 → 234 N")])
+@pytest.mark.parametrize(("scene", "told"), [("hdd_2003", "16.0 → "), ("five_bearing", "rear2 211 → 238, rear1 211 → 638, front3 382 → 926, front2 191 → 292, front1 191 → 234 N")])
 def test_the_preload_of_every_bearing_that_has_its_own(scene: str, told: str) -> None:
-    """That of one stood for all five; preload that rises is not what is left of it, and no change is -0."""
+    """That of one stood for all five, then five numbers and five names apart from them; preload that rises is not what is left of it, and no change is -0."""
     spindle = load(ROOT / "scenes" / scene)
     steps = [SimpleNamespace(point=operating_point(spindle, Condition(t))) for t in (20.0, 60.0)]
     cards = {what: (number, why) for what, number, why in headlines(SimpleNamespace(steps=steps), Table((), (), (20.0, 60.0), {}, ()))}  # type: ignore[arg-type]
