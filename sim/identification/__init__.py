@@ -10,6 +10,8 @@ pairing        which mode of one set is which of another: one cost, one assignme
 peak           a modal peak of a test, wherever it is from: what a log of a run keeps of it
 poles          poles of a matrix of frequency response functions by maximum likelihood, and where to start looking for
                them
+rank_one       modes from poles with free residues: residue matrices of rank one, poles at one place merged, faint modes that
+               bend the others
 remembered     modes of FRFs that were extracted before, kept on disk
 running_lines  lines of the running speed in measured FRFs: on a turning spindle the motion of unbalance and races
                stands beside the answer to the hammer

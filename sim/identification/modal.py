@@ -8,7 +8,7 @@ standard deviation of a complex number: sd^2 = E|e|^2 (half of it in each of the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -16,20 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.identification.pairing import mac as mac
-from thermospindle.sim.identification.poles import (
-    Fit,
-    Lines,
-    believed,
-    better,
-    information,
-    project,
-    realise,
-    refine,
-    removal,
-    search,
-    split,
-    varied,
-)
+from thermospindle.sim.identification.poles import Fit, Lines, believed, information, search, varied
+from thermospindle.sim.identification.rank_one import accepted
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 MOST_LINES = 6400
@@ -132,7 +120,7 @@ def extract(
     told = _telling(frf, sd, -(-len(frequency) // MOST_LINES))
     alike = _alike(window_decay / np.median(np.diff(frequency)))
     lines = Lines((window_decay + 2j * np.pi * frequency[told]) / unit, frf[..., told], np.sqrt(2) / sd[..., told], KINDS[kind], alike)
-    return _modes(*_accepted(lines, search(lines)), unit, given, frf.shape[:2], len(frequency), window_decay)
+    return _modes(*accepted(lines, search(lines)), unit, given, frf.shape[:2], len(frequency), window_decay)
 
 
 def _alike(lost: float) -> float:
@@ -154,90 +142,6 @@ def _telling(frf: ComplexArray, sd: Array, every: int) -> NDArray[np.intp]:
         if i - last >= every or np.any(np.abs(value[i] - value[last]) > np.maximum(size[i], size[last]) + error[i]):
             kept.append(i)
     return np.array(kept)
-
-
-def _accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, float, list[tuple[complex, complex]]]:
-    """The poles found as modes: as they are where the data accept them so, else those at one place with one shape merged.
-
-    The free residues of two modes nearly at one place are mixed, and look alike before rank one is imposed on them.
-    """
-    free, twice = merge(lines, found)
-    if twice and min(lines.frf.shape[:2]) > 1:  # else any residues are of rank one
-        as_found = impose_rank_one(lines, found)
-        if as_found[2]:
-            return *as_found, []
-    return *impose_rank_one(lines, free), twice
-
-
-def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
-    """The fit with R = shape participation^T for the believed poles in the band, and its strain: the rise of chi-square over what the constraints
-    alone cost, one where they cost no more; zero where the data refuse them.
-
-    They are taken as they are if chi-square rises by no more than five standard deviations over their number. If not, poles whose residues are far
-    from rank one are tried as two modes at nearly one place each. What then still rises more may be what modes beyond the band leave: where the
-    information criterion prefers rank one nevertheless it stands, strained, and errors are enlarged by the strain's root. Else residues stay free:
-    every function is a response of its own to one reference.
-    """
-    responses, references, n = lines.frf.shape
-    first = believed(lines, free.poles)
-    if not first.any():
-        return lines, free, 1.0
-    strained: list[tuple[float, Fit]] = []
-    if min(responses, references) > 1:
-        for trial in (make() for make in (lambda: free, lambda: split(lines, free))):
-            fit = refine(lines, start_rank_one(lines, trial), 1e-3)
-            constraints, rise = trial.unknowns - fit.unknowns, (fit.chi2 - trial.chi2) / trial.scale()
-            if same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
-                continue
-            if rise < lines.alike * (constraints + 5 * np.sqrt(2 * constraints)):
-                return lines, fit, 1.0
-            if not better(lines, trial, fit):
-                strained.append((max(rise / constraints / lines.alike, 1.0), fit))
-    if strained:
-        strain, fit = min(strained, key=lambda found: found[0])
-        return lines, fit, strain
-    flat = replace(lines, frf=lines.frf.reshape(-1, 1, n), weight=lines.weight.reshape(-1, 1, n))
-    free = refine(lines, free, 1e-3)
-    poles = np.append(free.poles[first], free.poles[~first])
-    return flat, project(flat, poles, free.residues[first], np.ones((first.sum(), 1), complex)), float(min(responses, references) == 1)
-
-
-def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
-    """One pole instead of two at one place with one shape; and for each such pair the pole kept and how far its place is spread.
-
-    Such a pair is one mode that was not the same in all functions: it moved between the references, or is not linear. The spread is
-    the standard deviation of two places that have the weights of their residues. Where one pole, refined alone, does as well, the second was no
-    more than a step of the search, and nothing is spread.
-    """
-    spread: list[tuple[complex, complex]] = []
-    while True:
-        shape = np.linalg.svd(free.residues.reshape(-1, *lines.frf.shape[:2]))[0][:, :, 0]
-        pairs = np.argwhere(same_mode(lines, free.poles, shape, 0.8) & believed(lines, free.poles))
-        if not len(pairs):
-            return free, spread
-        weaker, kept = sorted(pairs[0], key=lambda r: removal(free)[r])
-        size = np.linalg.norm(free.residues[[weaker, kept]], axis=1) / np.linalg.norm(free.residues[[weaker, kept]], axis=1).sum()
-        both, free = free, refine(lines, project(lines, np.delete(free.poles, weaker)))
-        if better(lines, both, free):
-            spread.append((both.poles[kept], (both.poles[weaker] - both.poles[kept]) * np.sqrt(size.prod())))
-
-
-def same_mode(lines: Lines, poles: ComplexArray, shape: ComplexArray, alike: float) -> NDArray[np.bool_]:
-    """(m, m), upper triangle: pairs of poles closer than their half-width or a line, with shapes (m, n_resp) that are `alike` by MAC."""
-    width = np.maximum((poles.real[:, None] + poles.real) / -2, np.diff(lines.s.imag).min())
-    return np.triu((np.abs(poles[:, None] - poles) < width) & (mac(shape, shape) > alike), 1)
-
-
-def start_rank_one(lines: Lines, free: Fit) -> Fit:
-    """The believed modes as products of shape and participation, overlapping ones together, from a fit with free residues."""
-    responses, references, _ = lines.frf.shape
-    first = believed(lines, free.poles)
-    rising = np.flatnonzero(first)[np.argsort(np.abs(free.poles[first]))]
-    edge, width = np.abs(free.poles[rising]), -free.poles[rising].real
-    apart = np.flatnonzero(edge[1:] - edge[:-1] > width[1:] + width[:-1]) + 1
-    parts = [realise(free.poles[i], free.residues[i].reshape(-1, responses, references)) for i in np.split(rising, apart)]
-    poles, shape, participation = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return project(lines, np.append(poles, free.poles[~first]), shape, participation)
 
 
 def _modes(

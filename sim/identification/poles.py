@@ -194,9 +194,7 @@ def search(lines: Lines) -> Fit:
     Where one more pole would lower chi-square most, poles are put and refined together with all others; they stay if the information
     criterion falls. Damping of the trial poles (2 %) is only a start, the refinement finds it.
     """
-    low, high = np.log(lines.s.imag[[0, -1]] * (1 / REACH, REACH))
-    grid = np.exp(np.arange(low, high, TRIAL) + 1j * np.arccos(-TRIAL))
-    fit = project(lines, np.zeros(0, complex))
+    grid, fit = trial_poles(lines), project(lines, np.zeros(0, complex))
     for _ in range(40):
         curve = gain(lines, fit, grid)
         peaks = 1 + np.flatnonzero((curve[1:-1] >= curve[:-2]) & (curve[1:-1] > curve[2:]))
@@ -211,6 +209,12 @@ def search(lines: Lines) -> Fit:
         else:
             break
     return fit
+
+
+def trial_poles(lines: Lines) -> ComplexArray:
+    """A grid (c,) of poles over the band and `REACH` beyond it."""
+    low, high = np.log(lines.s.imag[[0, -1]] * (1 / REACH, REACH))
+    return np.exp(np.arange(low, high, TRIAL) + 1j * np.arccos(-TRIAL))
 
 
 def prune(lines: Lines, fit: Fit) -> Fit:
