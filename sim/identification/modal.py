@@ -209,8 +209,8 @@ def _modes(
     for pole, offset in twice:
         near = np.flatnonzero(np.abs(poles - pole) < -pole.real)
         if len(near) == 1:  # else the two turned out to be modes of different shape
-            way = jacobian[:, [near[0], a + near[0]]] @ [offset.real, offset.imag]
-            spread += np.outer(way, way)
+            ways = np.abs(offset) * jacobian[:, [near[0], a + near[0]]]  # two places side by side are a broader peak, and one within the other a narrower
+            spread += ways @ ways.T
             moved += 1
     keep = np.flatnonzero(sure)[np.argsort(frequency[sure])]
     kept = np.append(keep, a + keep)

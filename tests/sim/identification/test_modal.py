@@ -217,6 +217,7 @@ def test_mode_that_moves_between_hammers_is_one_mode():
     assert len(modes.frequency) == 1
     assert 500 < modes.frequency[0] < 500.5
     assert modes.frequency_sd[0] > 0.2
+    assert modes.damping_sd[0] > 0.2 / 500  # of whirl at 1555 and 1562 Hz, told as one mode, it was off by 37 of its errors
     assert "two places" in modes.status
 
 
