@@ -209,7 +209,7 @@ def _modes(
     for pole, offset in twice:
         near = np.flatnonzero(np.abs(poles - pole) < -pole.real)
         if len(near) == 1:  # else the two turned out to be modes of different shape
-            ways = np.abs(offset) * jacobian[:, [near[0], a + near[0]]]  # two places side by side are a broader peak, and one within the other a narrower
+            ways = jacobian[:, [near[0], a + near[0]]] @ [[offset.real, offset.imag], [offset.imag, 0.0]]  # two places side by side are a broader peak, too
             spread += ways @ ways.T
             moved += 1
     keep = np.flatnonzero(sure)[np.argsort(frequency[sure])]
