@@ -204,7 +204,7 @@ def _modes(
 
     sd = np.sqrt(np.diag(spread))
     cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count) * lines.alike
-    sure = believed(lines, poles) & (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)  # the last refinement may have led a pole out of the band
+    sure = believed(lines, poles) & (np.arange(a) < a - fit.faint) & (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)  # the last refinement may have led a pole out of the band
     moved = 0
     for pole, offset in twice:
         near = np.flatnonzero(np.abs(poles - pole) < -pole.real)

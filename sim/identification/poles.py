@@ -67,7 +67,7 @@ class Fit:
 
     `shape` (a, n_resp) and `participation` (a, n_ref) belong to the first a poles, whose residues are imposed; `residues` (m, F), F the
     n_resp x n_ref functions in a row; `residual` (F, n) divided by its standard deviation; `gram` (F, q, q) weighted products of the
-    q basis functions [Re R, Im R, smooth, and the derivatives to the poles]; `inverse` that of its free part.
+    q basis functions [Re R, Im R, smooth, and the derivatives to the poles]; `inverse` that of its free part. The last `faint` ones of those imposed are there for the sake of the others alone.
     """
 
     poles: ComplexArray
@@ -78,6 +78,7 @@ class Fit:
     basis: ComplexArray
     gram: Array
     inverse: Array
+    faint: int = 0
 
     @property
     def chi2(self) -> float:

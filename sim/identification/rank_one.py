@@ -51,7 +51,7 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
     """The fit with R = shape participation^T for the believed poles in the band, and its strain: the rise of chi-square over what the constraints
     alone cost, one where they cost no more; zero where the data refuse them.
 
-    They are taken as they are, `completed` and `without_idle` ones, if chi-square rises by no more than five standard deviations over their number. If not, poles whose residues are far
+    They are taken as they are, and made `whole`, if chi-square rises by no more than five standard deviations over their number. If not, poles whose residues are far
     from rank one are tried as two modes at nearly one place each. What then still rises more may be what modes beyond the band leave: where the
     information criterion prefers rank one nevertheless it stands, strained, and errors are enlarged by the strain's root. Else residues stay free:
     every function is a response of its own to one reference.
@@ -68,12 +68,12 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
             if same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
                 continue
             if rise < lines.alike * (constraints + SURELY * np.sqrt(2 * constraints)):
-                return lines, without_idle(lines, completed(lines, fit)), 1.0
+                return lines, whole(lines, fit), 1.0
             if not better(lines, trial, fit):
                 strained.append((max(rise / constraints / lines.alike, 1.0), fit))
     if strained:
         strain, fit = min(strained, key=lambda found: found[0])
-        return lines, without_idle(lines, completed(lines, fit)), strain
+        return lines, whole(lines, fit), strain
     flat = replace(lines, frf=lines.frf.reshape(-1, 1, n), weight=lines.weight.reshape(-1, 1, n))
     free = refine(lines, free, 1e-3)
     poles = np.append(free.poles[first], free.poles[~first])
@@ -118,6 +118,12 @@ def start_rank_one(lines: Lines, free: Fit) -> Fit:
     return project(lines, np.append(poles, free.poles[~first]), shape, participation)
 
 
+def whole(lines: Lines, fit: Fit) -> Fit:
+    """`completed`, and without what only stood in for the faint modes."""
+    found = completed(lines, fit)
+    return without_idle(lines, replace(found, faint=len(found.shape) - len(fit.shape)))
+
+
 def completed(lines: Lines, fit: Fit) -> Fit:
     """With poles more that chi-square tells of, each with a residue of rank one, of which free residues had been too dear: left out, faint modes bend what overlapping ones tell of themselves.
 
@@ -148,7 +154,7 @@ def without_idle(lines: Lines, fit: Fit) -> Fit:
         trial = refine(lines, project(lines, fit.poles[others], fit.shape[imposed], fit.participation[imposed]), SOON)
         if trial.chi2 - fit.chi2 > by_noise(lines) * fit.scale():
             break
-        fit = refine(lines, trial, 1e-3)
+        fit = replace(refine(lines, trial, 1e-3), faint=fit.faint - int(told.argmin() >= len(fit.shape) - fit.faint))
     return fit
 
 
