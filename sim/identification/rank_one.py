@@ -144,9 +144,9 @@ def completed(lines: Lines, fit: Fit) -> Fit:
 
 
 def without_idle(lines: Lines, fit: Fit) -> Fit:
-    """Without the poles of rank one that chi-square tells nothing of: what they had stood in for is told by those that complete the fit."""
-    while len(fit.shape) > 1:
-        told = _told_of(fit, information(lines, fit)[0])
+    """Without the poles of rank one that chi-square tells nothing of: what they had stood in for is told by those that complete the fit, which were asked already."""
+    while len(fit.shape) > fit.faint + 1:
+        told = _told_of(fit, information(lines, fit)[0])[: len(fit.shape) - fit.faint]
         if told.min() > DOUBTED * by_noise(lines) * fit.scale():
             break
         others = np.arange(len(fit.poles)) != told.argmin()
@@ -154,7 +154,7 @@ def without_idle(lines: Lines, fit: Fit) -> Fit:
         trial = refine(lines, project(lines, fit.poles[others], fit.shape[imposed], fit.participation[imposed]), SOON)
         if trial.chi2 - fit.chi2 > by_noise(lines) * fit.scale():
             break
-        fit = replace(refine(lines, trial, 1e-3), faint=fit.faint - int(told.argmin() >= len(fit.shape) - fit.faint))
+        fit = replace(refine(lines, trial, 1e-3), faint=fit.faint)
     return fit
 
 
