@@ -177,8 +177,8 @@ def _ways_of(model: CampaignModel, best: Hypothesis, every: Sequence[Mechanism],
         others = [o for o in every if o.name == m.name and o.kind in (m.kind, "law") and o.variant != m.variant and promised.get(o.variant, np.inf) > least]
         acts = best.evidence.sizes[k][np.abs(best.evidence.sizes[k] - m.size.neutral).argmax()]
         for o in [] if idle and beside else sorted(others, key=lambda o: -promised.get(o.variant, -np.inf))[:WAYS]:
-            own = best.fit.point[at:sizes] if o.kind == m.kind else Problem(model, (o,)).start({0: acts})[len(model.parameters) :][: len(model.tests)]
-            start = np.concatenate([best.fit.point[:at], own, np.zeros(len(o.shape)), best.fit.point[after:]])
+            own = np.append(best.fit.point[at:sizes], np.zeros(len(o.shape))) if o.kind == m.kind else Problem(model, (o,)).start({0: acts})[len(model.parameters) :]
+            start = np.concatenate([best.fit.point[:at], own, best.fit.point[after:]])
             tasks.append(Task((*best.mechanisms[:k], o, *best.mechanisms[k + 1 :]), (start,), -np.inf))
         at = after
     found = fitted(model, tasks, TEMPERS[-1:], best.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * PLENTY)

@@ -15,8 +15,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.identification.pairing import mac as mac
-from thermospindle.sim.identification.poles import Fit, Lines, believed, information, search, varied
+from thermospindle.sim.identification.poles import Fit, Lines, believed, information, of_shape, search
 from thermospindle.sim.identification.rank_one import accepted
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
@@ -161,7 +160,7 @@ def _modes(
     `alike` b / (a + 2 d) times the variance that this fit tells, and a pole `alike` (b / (a + 2 d))^3 times, by least squares of exp(-b t), and of t exp(-b t) beside it, in noise that falls as exp(-d t).
     """
     responses, references = functions
-    m, a, width = len(fit.poles), *fit.shape.shape
+    a, width = fit.shape.shape
     # inverse of the information matrix by its eigenvectors, scaled to a unit diagonal first: parameters differ by many powers of ten
     matrix, _ = information(lines, fit)
     size = np.sqrt(np.abs(np.diag(matrix)))
@@ -194,13 +193,12 @@ def _modes(
         shape[r, largest] = 1
         # derivative of raw / raw[largest], so the standard errors are those of the normalised shape
         relative = (gather - np.outer(shape[r], gather[largest])) / raw[largest]
-        x = np.searchsorted(varied(fit), m + r * width + np.arange(width))
-        real, imag = np.ix_(x, x), np.ix_(half + x, half + x)
-        cross = covariance[np.ix_(half + x, x)]
-        hermitian = covariance[real] + covariance[imag] + 1j * (cross - cross.T)
+        x, own = of_shape(fit, r), np.append(fit.shape[r].real, fit.shape[r].imag)
+        block = covariance[np.ix_(x, x)]
+        cross = block[width:, :width]
+        hermitian = block[:width, :width] + block[width:, width:] + 1j * (cross - cross.T)
         shape_sd[r] = np.sqrt(np.einsum("ij,jk,ik->i", relative, hermitian, relative.conj()).real.clip(0) * max(lines.alike * slower[r], 1.0))
-        x, known = np.append(x, half + x), np.append(fit.shape[r].real, fit.shape[r].imag)
-        weight[r] = known @ matrix[np.ix_(x, x)] @ known / fit.scale()
+        weight[r] = own @ matrix[np.ix_(x, x)] @ own / fit.scale()
 
     sd = np.sqrt(np.diag(spread))
     cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count) * lines.alike

@@ -111,7 +111,7 @@ def project(lines: Lines, poles: ComplexArray, shape: ComplexArray | None = None
     parts = np.hstack([basis.real.T, basis.imag.T])
     gram = np.stack([weighted @ weighted.T for weighted in (parts * np.tile(w, 2) for w in weight)])  # of one array: half the products
     free = np.r_[a:m, m + a : p]
-    inverse = _inverse(gram[:, free[:, None], free])
+    inverse = inverted(gram[:, free[:, None], free])
     coefficients = np.zeros((len(frf), p))
     imposed = np.einsum("ri,rk->ikr", shape, participation).reshape(len(frf), a)
     coefficients[:, :a], coefficients[:, m : m + a] = imposed.real, imposed.imag
@@ -158,6 +158,13 @@ def varied(fit: Fit) -> NDArray[np.intp]:
     before = len(fit.poles) + fit.shape.size
     held = before + np.arange(len(fit.shape)) * fit.participation.shape[1] + np.abs(fit.participation).argmax(1)
     return np.setdiff1d(np.arange(before + fit.participation.size), held)
+
+
+def of_shape(fit: Fit, r: int) -> NDArray[np.intp]:
+    """Indices (2 n_resp,) of the shape of imposed pole r, real parts and then imaginary ones, among the [Re z, Im z] of `information`."""
+    varying, width = varied(fit), fit.shape.shape[1]
+    real = np.searchsorted(varying, len(fit.poles) + r * width + np.arange(width))
+    return np.append(real, len(varying) + real)
 
 
 def refine(lines: Lines, fit: Fit, tolerance: float = 1.0) -> Fit:
@@ -330,7 +337,7 @@ def _pairs(lines: Lines, poles: ComplexArray, order: int) -> ComplexArray:
     return np.hstack([upper + lower, 1j * (upper - lower)]) * (lines.s**lines.power)[:, None]
 
 
-def _inverse(gram: Array) -> Array:
+def inverted(gram: Array) -> Array:
     """Inverses of positive matrices (..., p, p), scaled to unit diagonal first."""
     size = np.sqrt(np.einsum("...ii->...i", gram))
     scaled = gram / size[..., None] / size[..., None, :] + ROUNDING * np.eye(gram.shape[-1])

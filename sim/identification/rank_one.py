@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.identification.pairing import mac
 from thermospindle.sim.identification.poles import (
-    ROUNDING,
     Fit,
     Lines,
     believed,
     better,
     gain,
     information,
+    inverted,
+    of_shape,
     project,
     realise,
     refine,
     removal,
     split,
     trial_poles,
-    varied,
 )
 
 SURELY = 5.0
@@ -67,7 +67,7 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
             constraints, rise = trial.unknowns - fit.unknowns, (fit.chi2 - trial.chi2) / trial.scale()
             if same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
                 continue
-            if rise < lines.alike * (constraints + SURELY * np.sqrt(2 * constraints)):
+            if rise < by_noise(lines, constraints):
                 return lines, whole(lines, fit), 1.0
             if not better(lines, trial, fit):
                 strained.append((max(rise / constraints / lines.alike, 1.0), fit))
@@ -120,8 +120,7 @@ def start_rank_one(lines: Lines, free: Fit) -> Fit:
 
 def whole(lines: Lines, fit: Fit) -> Fit:
     """`completed`, and without what only stood in for the faint modes."""
-    found = completed(lines, fit)
-    return without_idle(lines, replace(found, faint=len(found.shape) - len(fit.shape)))
+    return without_idle(lines, completed(lines, fit))
 
 
 def completed(lines: Lines, fit: Fit) -> Fit:
@@ -130,47 +129,45 @@ def completed(lines: Lines, fit: Fit) -> Fit:
     On a machine-tool spindle at 6000 rpm the three within 45 Hz were off by up to eleven of their standard errors for them. One stays where chi-square falls by more than is `by_noise`.
     """
     responses, references, _ = lines.frf.shape
-    grid, imposed = trial_poles(lines), len(fit.shape)
+    grid, told, least = trial_poles(lines), len(fit.shape), by_noise(lines, 2 * (responses + references))
     for _ in range(MOST_FAINT):
         new = grid[gain(lines, project(lines, fit.poles), grid).argmax()]
         beside = project(lines, np.append(fit.poles, new), fit.shape, fit.participation)
         u, size, v = np.linalg.svd(beside.residues[-1].reshape(responses, references))
-        poles = np.insert(fit.poles, imposed, new)
+        poles = np.insert(fit.poles, len(fit.shape), new)
         trial = refine(lines, project(lines, poles, np.vstack([fit.shape, u[:, 0] * size[0]]), np.vstack([fit.participation, v[0]])), SOON)
-        if fit.chi2 - trial.chi2 < by_noise(lines) * trial.scale() or same_mode(lines, trial.poles[: imposed + 1], trial.shape, 0.95).any():  # a mode that is at two places is no other
+        twice = same_mode(lines, trial.poles[: len(trial.shape)], trial.shape, 0.95).any()  # a mode that is at two places is no other
+        if twice or fit.chi2 - trial.chi2 < least * trial.scale():
             break
-        fit, imposed = refine(lines, trial, 1e-3), imposed + 1
-    return fit
+        fit = refine(lines, trial, 1e-3)
+    return replace(fit, faint=len(fit.shape) - told)
 
 
 def without_idle(lines: Lines, fit: Fit) -> Fit:
     """Without the poles of rank one that chi-square tells nothing of: what they had stood in for is told by those that complete the fit, which were asked already."""
+    least = by_noise(lines, 2 * sum(lines.frf.shape[:2]))
     while len(fit.shape) > fit.faint + 1:
-        told = _told_of(fit, information(lines, fit)[0])[: len(fit.shape) - fit.faint]
-        if told.min() > DOUBTED * by_noise(lines) * fit.scale():
+        told = _told_of(lines, fit)[: len(fit.shape) - fit.faint]
+        if told.min() > DOUBTED * least * fit.scale():
             break
         others = np.arange(len(fit.poles)) != told.argmin()
         imposed = others[: len(fit.shape)]
         trial = refine(lines, project(lines, fit.poles[others], fit.shape[imposed], fit.participation[imposed]), SOON)
-        if trial.chi2 - fit.chi2 > by_noise(lines) * fit.scale():
+        if trial.chi2 - fit.chi2 > least * fit.scale():
             break
         fit = replace(refine(lines, trial, 1e-3), faint=fit.faint)
     return fit
 
 
-def by_noise(lines: Lines) -> float:
-    """What a pole of rank one that is not there takes off chi-square, and `SURELY` standard deviations of that."""
-    unknowns = 2 * sum(lines.frf.shape[:2])
+def by_noise(lines: Lines, unknowns: int) -> float:
+    """What noise alone lets so many unknowns take off chi-square at most: their number, and `SURELY` standard deviations of that."""
     return float(lines.alike * (unknowns + SURELY * np.sqrt(2 * unknowns)))
 
 
-def _told_of(fit: Fit, matrix: Array) -> Array:
-    """(a,) rise of chi-square without the shape of each pole of rank one, all else following, to second order (Wald's statistic) from the information `matrix` (2z, 2z)."""
-    size, width, half = np.sqrt(np.abs(np.diag(matrix))), fit.shape.shape[1], len(matrix) // 2
-    covariance = np.linalg.inv(matrix / size / size[:, None] + ROUNDING * np.eye(len(size))) / size / size[:, None]
-    told = []
+def _told_of(lines: Lines, fit: Fit) -> Array:
+    """(a,) rise of chi-square without the shape of each pole of rank one, all else following, to second order (Wald's statistic)."""
+    covariance, told = inverted(information(lines, fit)[0]), []
     for r, shape in enumerate(fit.shape):
-        x = np.searchsorted(varied(fit), len(fit.poles) + r * width + np.arange(width))
-        x, own = np.append(x, half + x), np.append(shape.real, shape.imag)
+        x, own = of_shape(fit, r), np.append(shape.real, shape.imag)
         told.append(own @ np.linalg.solve(covariance[np.ix_(x, x)], own))
     return np.array(told)

@@ -122,18 +122,20 @@ def test_lines_by_themselves():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [113, 165])
-def test_noise_under_a_window_is_that_of_all_tests(seed):
-    """Blind campaigns 113 and 165: the same noise in every test. A fit of it that let one block rule the next told a tenth of it in one test, and that was missed
-    by six standard errors and more. Nothing is hidden in 165: its errors come true where it is told that records begin with the hit, and cover a later one where it is not."""
+@pytest.mark.parametrize(
+    ("seed", "told"),
+    [(113, None), (165, 0.0), pytest.param(165, None, marks=pytest.mark.xfail(strict=True, reason="where it is not told how long before the hit records begin, errors cover a later one: rms 0.75 to 0.78 of them"))],
+)
+def test_noise_under_a_window_is_that_of_all_tests(seed, told):
+    """Blind campaigns 113 and 165, as they are or told that records begin with the hit: the same noise in every test. A fit of it that let one block rule the next told a tenth of it in one test, and that was missed
+    by six standard errors and more."""
     drawn = draw(seed)
     made = drawn.made().campaign
-    model = campaign_data(drawn.spindle, made)
+    model = campaign_data(drawn.spindle, replace(made, tests=tuple(replace(t, pretrigger=told) for t in made.tests)))
     assert {data.noise_from for data in model.tests} == {"scatter of neighbouring lines"}
     lines = [data.value.shape[-1] for data in model.tests]
     assert max(lines) < 2 * min(lines)  # noise told too small divides the band to single lines
-    for told, least in ((None, 0.7), (0.0, 0.8)) if seed == 165 else ():
-        model = campaign_data(drawn.spindle, replace(made, tests=tuple(replace(t, pretrigger=told) for t in made.tests)))
+    if seed == 165:  # nothing hidden
         left = [np.sqrt(chi2 / data.count) for (chi2, _, _), data in zip(fit(model).by_test, model.tests, strict=True)]
         assert max(left) < 1.2
-        assert min(left) > least
+        assert min(left) > 0.8
