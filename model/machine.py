@@ -7,7 +7,7 @@ and a structure is stands in `model.bearing.definitions`, `model.material` and `
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,6 +35,11 @@ class Region:
     r: tuple[float, float]
     z: tuple[float, float]
     role: str = ""  # shaft, hub, insert or support: what effects know it by; empty for none of these
+
+    @property
+    def outline(self) -> Region:
+        """Itself without a material and a role: spindles whose outlines are equal have the same sections."""
+        return replace(self, material="", role="")
 
 
 @dataclass(frozen=True)

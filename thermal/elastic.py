@@ -66,6 +66,7 @@ class Response:
 
     `gain[i, k]` is the motion (m) for a unit strain of region k, `density[i, e, q]` that for a unit strain at quadrature point
     q of element e, weight included, `shape[k]` the displacement (nodes, 2) of every node for a unit strain of region k.
+    `stiffening[i, k, m]` is what `gain[i, k]` changes by per relative change of Young's modulus of region m.
     """
 
     section: PartMesh
@@ -73,6 +74,7 @@ class Response:
     gain: np.ndarray  # (2 races, regions)
     density: np.ndarray  # (2 races, elements, points)
     shape: np.ndarray  # (regions, nodes, 2)
+    stiffening: np.ndarray  # (2 races, regions, regions)
 
 
 class Solid:
@@ -192,5 +194,22 @@ class Solid:
         weight = (3 * self.lam + 2 * self.mu) * r * self.basis.dx
         density = np.array([weight * dilatation(self.basis.interpolate(a), r) for a in adjoint])
         units = self.region_strains()
-        response = Response(self.section, tuple(races), np.einsum("ieq,keq->ik", density, units), density, self.region_displacement())
+        gain, shape = np.einsum("ieq,keq->ik", density, units), self.region_displacement()
+        stiffening = stiffened(gain, self._virtual_work(adjoint, shape.reshape(len(shape), -1)))
+        response = Response(self.section, tuple(races), gain, density, shape, stiffening)
         return response, adjoint.reshape(len(adjoint), -1, 2)
+
+    def _virtual_work(self, adjoint: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+        """Work (a, u, regions) of the stresses of displacements (u, dofs) on the strains of adjoint ones (a, dofs), region by region."""
+        dofs = self.basis.element_dofs
+        each = np.einsum("iae,abe,kbe->ike", adjoint[:, dofs], self.element_stiffness, displacement[:, dofs], optimize=True)
+        return np.stack([each[..., self.section.region_of == m].sum(axis=-1) for m in range(len(self.section.regions))], axis=-1)
+
+
+def stiffened(gain: np.ndarray, work: np.ndarray) -> np.ndarray:
+    """`Response.stiffening` from the gain (i, k) and the virtual work (i, k, m) of region m.
+
+    j . K^-1 f changes by a . (f' - K' u), a = K^-1 j and u = K^-1 f (Haug, Choi, Komkov, Design Sensitivity Analysis of Structural Systems, 1986,
+    sec. 1.2). Both K and the load of a region are in proportion to Young's moduli, and a . f is the gain.
+    """
+    return gain[..., None] * np.eye(gain.shape[1]) - work

@@ -17,7 +17,7 @@ import numpy as np
 from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle, kept
 from thermospindle.model.material import Law
 from thermospindle.thermal import store
-from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid
+from thermospindle.thermal.elastic import Elasticity, Race, Response
 from thermospindle.thermal.mesh import PartMesh, tiled
 from thermospindle.thermal.reduced import Reduced, reduced
 from thermospindle.thermal.reduced import Region as Softening
@@ -133,6 +133,16 @@ def _gains(of: _Of, tolerance: float) -> tuple[Callable[[Mapping[str, float]], G
     return tuple(found)
 
 
+def at_reference(spindle: Spindle) -> tuple[Response, ...]:
+    """`influence` at the reference temperature to its own tolerance, part by part."""
+    return _at_reference(_of(spindle))
+
+
+@lru_cache(maxsize=64)
+def _at_reference(of: _Of) -> tuple[Response, ...]:
+    return tuple(influence(of.spindle).responses.values())
+
+
 def _constant(gain: Gain, temperatures: Mapping[str, float]) -> Gain:
     return gain
 
@@ -140,19 +150,6 @@ def _constant(gain: Gain, temperatures: Mapping[str, float]) -> Gain:
 def _softening(space: Reduced, temperatures: Mapping[str, float]) -> Gain:
     moduli = np.array([region.youngs_modulus(temperatures[region.name]) for region in space.regions])
     return Gain(space.races, space.section.regions, space.solution(moduli)[0])
-
-
-def on_its_mesh(spindle: Spindle, other: Spindle, part: str) -> Response:
-    """The influence of a part of `other`, a spindle that differs in its moduli, on the mesh of `spindle`: what two differ by there is no error of the meshes, and costs one
-    solution."""
-    return _beside(_question(spindle, part, TOLERANCE, None), _question(other, part, TOLERANCE, None))
-
-
-@lru_cache(maxsize=64)
-def _beside(question: Elastic, other: Elastic) -> Response:
-    response, convergence = _kept(question)
-    key = f"{other!r} on the mesh of {question!r}"
-    return _stored(key, lambda: (Solid(response.section, dict(other.elasticity)).respond(other.races)[0], convergence))[0]
 
 
 def _softened(spindle: Spindle, part: str, temperatures: Mapping[str, float] | None) -> tuple[tuple[str, float], ...] | None:
@@ -229,7 +226,7 @@ def raceways(spindle: Spindle, bearing: Bearing | RollerBearing) -> tuple[Race, 
 
 
 def _question(spindle: Spindle, part: str, tolerance: float, temperatures: Mapping[str, float] | None) -> Elastic:
-    regions = tuple(g for g in spindle.regions if g.part == part)
+    regions = tuple(g.outline for g in spindle.regions if g.part == part)
     moduli = elasticity(spindle, temperatures)
     return Elastic(part, regions, tuple((g.name, moduli[g.name]) for g in regions), races(spindle, part), tolerance)
 
@@ -257,5 +254,5 @@ def _answer(question: Elastic, start: PartMesh) -> tuple[Response, Convergence]:
 def forget() -> None:
     """Drop what this process has kept, so that it reads from disk or computes again as a new one would."""
     _kept.cache_clear()
-    _beside.cache_clear()
     _gains.cache_clear()
+    _at_reference.cache_clear()

@@ -20,7 +20,7 @@ import numpy as np
 from skfem import Basis
 
 from thermospindle.model.material import Law
-from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid, dilatation
+from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid, dilatation, stiffened
 from thermospindle.thermal.mesh import PartMesh
 from thermospindle.thermal.refine import largest_motion
 
@@ -71,7 +71,8 @@ class Reduced:
         bulk = own / (1 - 2 * np.array([r.poisson_ratio for r in self.regions]))  # 3 lambda + 2 mu
         weight = bulk[self.section.region_of][:, None] * self.volume
         density = weight * np.tensordot(adjoint, self.dilatations, axes=1)
-        return Response(self.section, self.races, gain, density, np.tensordot(unit, self.fields, axes=1))
+        work = np.einsum("ia,mab,kb->ikm", adjoint, own[:, None, None] * self.stiffness, unit, optimize=True)
+        return Response(self.section, self.races, gain, density, np.tensordot(unit, self.fields, axes=1), stiffened(gain, work))
 
     @cached_property
     def volume(self) -> np.ndarray:

@@ -16,7 +16,7 @@ from thermospindle.thermal.mesh import PartMesh
 from thermospindle.thermal.reduced import Reduced, Region
 from thermospindle.thermal.refine import Convergence
 
-ARRAYS = ("gain", "density", "shape")
+ARRAYS = ("gain", "density", "shape", "stiffening")
 SPACE = ("fields", "stiffness", "load", "motion")
 KIND = "influence"
 

@@ -104,3 +104,20 @@ def test_only_the_ratio_of_moduli_matters(spindle):
     gains = [Solid(section, e).respond(races(spindle, "rotating"))[0].gain for e in (moduli, twice, softer)]
     assert gains[1] == pytest.approx(gains[0], rel=1e-9, abs=1e-12)
     assert np.abs(gains[2] - gains[0]).max() > 1e-3 * np.abs(gains[0]).max()
+
+
+@pytest.mark.parametrize("part", ["stationary", "rotating"])
+def test_stiffening_against_central_differences(spindle, part):
+    """A relative change h of one modulus either way: to h^2. All moduli alike change no motion."""
+    section, h = section_mesh(spindle, part, 2e-3), 1e-3
+    constants = elasticity(spindle)
+    hard = Solid(section, constants)
+    found = hard.respond(races(spindle, part))[0]
+    for m, name in enumerate(section.regions):
+        gains = []
+        for change in (h, -h):
+            one = replace(constants[name], youngs_modulus=(1 + change) * constants[name].youngs_modulus)
+            gains.append(hard.with_moduli({**constants, name: one}).respond(found.races)[0].gain)
+        assert found.stiffening[..., m] == pytest.approx((gains[0] - gains[1]) / (2 * h), rel=2e-6, abs=1e-6 * np.abs(found.stiffening).max())
+    assert np.abs(found.stiffening).max() > 0.01 * np.abs(found.gain).max()
+    assert np.abs(found.stiffening.sum(axis=-1)).max() < 1e-9 * np.abs(found.stiffening).max()

@@ -214,6 +214,10 @@ class TestCache:
         longer = tuple(replace(g, z=(g.z[0], 21e-3)) if g.name == "sleeve" else g for g in spindle.regions)
         influence(replace(spindle, regions=longer), tolerance=2e-2)
         assert len(calls) == 5  # the stationary part is the same
+        named = replace(steel, name="another name", thermal_expansion=Law((20.0,), (13e-6,)))
+        regions = tuple(replace(g, material=named.name, role="") if g.role == "shaft" else g for g in spindle.regions)
+        influence(replace(spindle, regions=regions, materials=dict(spindle.materials) | {named.name: named}), tolerance=2e-2)
+        assert len(calls) == 5  # what a region is called to be made of is nothing to its elasticity
 
     @pytest.mark.parametrize("error", [NotImplementedError, RuntimeError, SyntaxError], ids=lambda e: e.__name__)
     def test_whatever_a_damaged_file_raises_it_is_recomputed(self, spindle, monkeypatch, tmp_path, error):

@@ -41,6 +41,7 @@ def test_against_whole_solutions(softening, part, apart):
     uneven = [np.einsum("ieq,e->i", r.density, height / height.max()) for r in (found, whole)]
     assert np.abs(uneven[0] - uneven[1]).max() < 1e-5 * scale
     assert np.abs(found.shape - whole.shape).max() < 1e-4 * np.abs(whole.shape).max()
+    assert np.abs(found.stiffening - whole.stiffening).max() < 1e-4 * np.abs(whole.stiffening).max()
     quick = next(g for g in gains(softening, ROUGH, means) if g.races == found.races)
     assert quick.value == pytest.approx(found.gain, rel=1e-12, abs=1e-12 * scale)
 

@@ -5,13 +5,12 @@ for most of them, and shear moduli fall a little faster. One number and the scen
 
 The contacts get softened copies of the ball and ring materials. The section's own stay as they are, which spares finite elements at every
 temperature; ring motions depend only on ratios of moduli (aluminium softens by 1 % against steel over 40 K), and get
-their change by every material's modulus, solved once and kept, in proportion.
+their change by every region's modulus, which the influence holds, in proportion.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,9 +29,6 @@ SLOPE = 22.0
 
 RANGE = (-100.0, 250.0)
 """Temperatures (C) between which a constant modulus is replaced by a falling one."""
-
-STEP = 0.02
-"""Relative fall of one modulus for the sensitivity of ring motions: far above rounding, still linear."""
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
@@ -63,18 +59,17 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
     """Ring motions by the chamber's temperature as softer materials change them, to first order in the softening."""
-    from thermospindle.thermal.influence import every_race  # finite elements, which the catalogue is read without
+    from thermospindle.thermal.influence import at_reference, every_race  # finite elements, which the catalogue is read without
 
     scale = values["scale"]
     if scale == 0.0 or condition.temperature == spindle.reference_temperature:
         return by_bearing
-    used = {name: spindle.materials[name] for name in dict.fromkeys(g.material for g in spindle.regions)}
-    strain = {name: m.thermal_strain(condition.temperature, spindle.reference_temperature) for name, m in used.items()}
     change: dict[Race, Array] = {}
-    for found in sensitivity(spindle):
-        softer = found.gain @ np.array([strain[name] for name in found.strained])
-        moved = scale * SLOPE * np.array([strain[name] for name in found.materials]) @ softer
-        change |= dict(zip(found.races, moved.reshape(-1, 2), strict=True))
+    for response in at_reference(spindle):
+        made_of = (spindle.materials[spindle.region(name).material] for name in response.section.regions)
+        strain = np.array([m.thermal_strain(condition.temperature, spindle.reference_temperature) for m in made_of])
+        moved = -scale * SLOPE * response.stiffening @ strain @ strain
+        change |= dict(zip(response.races, moved.reshape(-1, 2), strict=True))
     changed = {}
     for b in spindle.ringed:
         motion, (inner, outer) = by_bearing[b.name], (change[race] for race in every_race(spindle)[b.name])
@@ -86,60 +81,6 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
             outer_z=motion.outer_z + float(outer[1]),
         )
     return by_bearing | changed
-
-
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
-    """How softer materials change the thermal motion of one part's rings.
-
-    `gain` (materials, 2 rings, regions): r and z motion (m) by the thermal strain of each region and the relative fall of one
-    material's modulus; `strained` names the material of each region.
-    """
-
-    races: tuple[Race, ...]
-    materials: tuple[str, ...]
-    strained: tuple[str, ...]
-    gain: Array
-
-
-@dataclass(frozen=True)
-class Section:
-    """A spindle as its elastic section sees it: equal `key`, equal sensitivity."""
-
-    key: tuple
-    spindle: Spindle = field(compare=False, repr=False)
-
-
-def sensitivity(spindle: Spindle) -> tuple[Sensitivity, ...]:
-    """Solved once for each section and set of moduli, part by part."""
-    from thermospindle.thermal.influence import every_race
-
-    moduli = tuple(
-        (m.youngs_modulus(spindle.reference_temperature), m.poisson_ratio) for m in (spindle.materials[g.material] for g in spindle.regions)
-    )
-    faces = tuple(every_race(spindle).values())
-    return _sensitivity(Section((spindle.regions, moduli, faces), spindle))
-
-
-@lru_cache(maxsize=8)
-def _sensitivity(section: Section) -> tuple[Sensitivity, ...]:
-    from thermospindle.thermal.influence import influence, on_its_mesh
-
-    spindle = section.spindle
-    found = []
-    for part, hard in influence(spindle).responses.items():
-        strained = tuple(spindle.region(name).material for name in hard.section.regions)
-        used = tuple(dict.fromkeys(strained))
-        gains = [on_its_mesh(spindle, _softer(spindle, name), part).gain if len(used) > 1 else hard.gain for name in used]
-        found.append(Sensitivity(hard.races, used, strained, (np.array(gains) - hard.gain) / STEP))
-    return tuple(found)
-
-
-def _softer(spindle: Spindle, name: str) -> Spindle:
-    """The spindle with the modulus of one material lower by `STEP`."""
-    material = spindle.materials[name]
-    law = Law(material.youngs_modulus.temperature, tuple((1 - STEP) * e for e in material.youngs_modulus.value))
-    return replace(spindle, materials={**spindle.materials, name: replace(material, youngs_modulus=law)})
 
 
 def softening(material: Material, temperature: float, reference: float, scale: float = 1.0) -> float:

@@ -91,7 +91,7 @@ def unit_rise(spindle: Spindle) -> UnitRise:
     conductivity = tuple(spindle.materials[g.material].conductivity for g in spindle.regions)
     rings = tuple(every_race(spindle).values())
     thermal = spindle.thermal
-    key = (spindle.regions, conductivity, rings, thermal.convections, thermal.gaps, thermal.friction.conductance)
+    key = (tuple(g.outline for g in spindle.regions), conductivity, rings, thermal.convections, thermal.gaps, thermal.friction.conductance)
     return _unit_rise(Conduction(key, spindle))
 
 
