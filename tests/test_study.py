@@ -198,8 +198,8 @@ def test_a_fleet_shows_who_stands_apart(fleet, capsys):
     assert "sn1" in rows[1]["error"]
     assert answer["errors"] == 1
     assert {(o["campaign"], o["of"]) for o in answer["outliers"][:2]} == {("sn3", f"frequency error of mode {n}") for n in (3, 4)}
-    ranked = [r["campaign"] for r in answer["ranking"] if r["error"] is None]
-    assert ranked[0] == "sn3"
+    ranked = [r["campaign"] for r in answer["ranking"]]
+    assert (ranked[0], ranked[-1]) == ("sn3", "sn1")
     assert (out / "fleet.png").is_file()
     (fleet / "fleet" / "sn2" / "modes.csv").write_text("nonsense", encoding="utf-8")
     assert main(["study", str(fleet / "study.toml"), "--out", str(out)]) == 2

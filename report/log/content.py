@@ -71,7 +71,8 @@ def summary(run: Run, found: Sequence[Peak]) -> str:
     temperatures = sorted({p.temperature for p in found})
     own = sorted(s.point.condition.temperature for s in run.steps)
     ends = list(dict.fromkeys((own[0], own[-1])))
-    lines = ["Modal peaks, Hz: **computed** / identified / *measured*", "", *_table(found, ends)]
+    kinds = ["**computed**", "identified", *(["*measured*"] if run.measured else [])]
+    lines = [f"Modal peaks, Hz: {' / '.join(kinds)}", "", *_table(found, ends)]
     lines += ["", "All temperatures:", "", *_table(found, temperatures)] if temperatures != ends else []
     named = [(f"{s.point.condition.temperature:g} °C", s) for s in run.steps]
     lines += ["", f"**{run.spindle.title}**", "", "Bearings:", ""]

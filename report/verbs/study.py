@@ -124,10 +124,10 @@ def _told(of: Cases | Fleet | Designs, table: pa.Table) -> tuple[dict[str, Any],
 
 
 def _fleet_told(table: pa.Table) -> tuple[dict[str, Any], dict[str, Figure]]:
-    """Campaigns with the largest error first, and what of them lies beyond `APART` robust standard deviations."""
+    """Campaigns with the largest error first, those without one last, and what of them lies beyond `APART` robust standard deviations."""
     rows = table.to_pylist()
     distance = apart(rows)
-    order = sorted(range(len(rows)), key=lambda k: -(rows[k]["rms_residual"] or np.inf))
+    order = sorted(range(len(rows)), key=lambda k: np.inf if rows[k]["rms_residual"] is None else -rows[k]["rms_residual"])
     found = [
         {"campaign": rows[k]["campaign"], "of": name, "z": float(z[k])}
         for name, z in distance.items()

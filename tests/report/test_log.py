@@ -171,7 +171,10 @@ def test_measured_modes_are_the_models_of_their_kind_in_order(run: Run) -> None:
         5: ("axial", 2068.0),
     }
     table = log_content.summary(run, log_content.peaks(run))
+    assert "Modal peaks, Hz: **computed** / identified / *measured*\n" in table
     assert "| 3 rocking | **1795** / 1795 / *1738* | **1775** / 1775 / *1710* |" in table
+    alone = replace(run, measured=())
+    assert "measured" not in log_content.summary(alone, log_content.peaks(alone)).lower()
 
 
 def test_an_identified_peak_without_a_mode_is_shown_too(run: Run, tmp_path: Path) -> None:
