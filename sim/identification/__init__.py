@@ -1,6 +1,7 @@
 """From FRFs to modes: physical checks, poles by maximum likelihood, modes with standard errors, and which mode is which.
 
 =============  =========================================================================================================
+close_poles    two poles nearly at one place: whether they have one shape, and how far they can be told apart
 frf            FRFs of one modal test, and the physical checks that measured and virtual ones must pass before anything
                is built on them
 modal          modes of a measured matrix of frequency response functions, with standard errors

@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.identification.close_poles import PARTED, near, second_moment
 from thermospindle.sim.identification.poles import Fit, Lines, believed, information, of_shape, search
 from thermospindle.sim.identification.rank_one import accepted
 
@@ -205,11 +206,18 @@ def _modes(
     sure = believed(lines, poles) & (np.arange(a) < a - fit.faint) & (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)  # the last refinement may have led a pole out of the band
     moved = 0
     for pole, offset in twice:
-        near = np.flatnonzero(np.abs(poles - pole) < -pole.real)
-        if len(near) == 1:  # else the two turned out to be modes of different shape
-            ways = jacobian[:, [near[0], a + near[0]]] @ [[offset.real, offset.imag], [offset.imag, 0.0]]  # two places side by side are a broader peak, too
+        there = np.flatnonzero(np.abs(poles - pole) < -pole.real)
+        if len(there) == 1:  # else the two turned out to be modes of different shape
+            ways = jacobian[:, [there[0], a + there[0]]] @ [[offset.real, offset.imag], [offset.imag, 0.0]]  # two places side by side are a broader peak, too
             spread += ways @ ways.T
             moved += 1
+    mixed = 0
+    for i, j in np.argwhere(near(lines, poles)) if width == responses and fit.participation.shape[1] == 1 else ():
+        second, error = second_moment(lines, fit, i, j)
+        if abs(second) < PARTED * error:
+            for r in (i, j):
+                spread += error * jacobian[:, [r, a + r]] @ jacobian[:, [r, a + r]].T
+            mixed += 1
     keep = np.flatnonzero(sure)[np.argsort(frequency[sure])]
     kept = np.append(keep, a + keep)
     chi2 = fit.chi2 / (lines.count - fit.unknowns)
@@ -219,6 +227,7 @@ def _modes(
     words += [] if strain else ["residues of rank one refused by the data, left free"]
     words += [f"residues of rank one strained, errors enlarged by {np.sqrt(strain):.2g}"] if strain > 1 else []
     words += [f"{moved} mode{'s' * (moved > 1)} at two places with one shape, errors enlarged by their distance"] if moved else []
+    words += [f"{mixed} pair{'s' * (mixed > 1)} of modes hardly apart, errors enlarged by what their distance may be"] if mixed else []
     words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
     edges = np.round(lines.s.imag[[0, -1]] * unit / (2 * np.pi), 6)
     return Modes(

@@ -106,7 +106,7 @@ def project(lines: Lines, poles: ComplexArray, shape: ComplexArray | None = None
     frf, weight = lines.frf.reshape(-1, n), lines.weight.reshape(-1, n)
     smooth = lines.s[:, None] ** (lines.power + SMOOTH)
     smooth = smooth @ np.linalg.inv(np.linalg.qr(np.vstack([smooth.real, smooth.imag]))[1])  # else parallel in a narrow band
-    basis = np.hstack([_pairs(lines, poles, 1), smooth, _pairs(lines, poles, 2)])
+    basis = np.hstack([terms(lines, poles, 1), smooth, terms(lines, poles, 2)])
     p = 2 * m + len(SMOOTH)
     parts = np.hstack([basis.real.T, basis.imag.T])
     gram = np.stack([weighted @ weighted.T for weighted in (parts * np.tile(w, 2) for w in weight)])  # of one array: half the products
@@ -246,7 +246,7 @@ def gain(lines: Lines, fit: Fit, candidates: ComplexArray) -> Array:
     square = np.add.reduceat(weight**2, first, axis=1)
     p = 2 * len(fit.poles) + len(SMOOTH)
     centre = lines.s.real[first] + 1j * np.add.reduceat(lines.s.imag, first) / np.diff(np.append(first, n))
-    new = _pairs(replace(lines, s=centre), candidates, 1)
+    new = terms(replace(lines, s=centre), candidates, 1)
     slope = (np.add.reduceat(weight * fit.residual, first, axis=1) @ new.conj()).real.reshape(-1, 2, c).transpose(0, 2, 1)
     old = [np.add.reduceat(fit.basis[:, :p] * w[:, None] ** 2, first, axis=0) for w in weight]
     cross = np.stack([(new.conj().T @ own).real for own in old]).reshape(-1, 2, c, p).transpose(0, 2, 1, 3)
@@ -331,7 +331,7 @@ def _moved(lines: Lines, fit: Fit, step: Array) -> Fit:
     return project(lines, poles, shape.reshape(fit.shape.shape), participation.reshape(fit.participation.shape))
 
 
-def _pairs(lines: Lines, poles: ComplexArray, order: int) -> ComplexArray:
+def terms(lines: Lines, poles: ComplexArray, order: int) -> ComplexArray:
     """(n, 2m) functions of the real and of the imaginary part of a residue over (s - pole)^order, with its conjugate."""
     upper, lower = (lines.s[:, None] - poles) ** -order, (lines.s[:, None] - poles.conj()) ** -order
     return np.hstack([upper + lower, 1j * (upper - lower)]) * (lines.s**lines.power)[:, None]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.identification.close_poles import PARTED, covariance_of, near, one_shape, second_moment
 from thermospindle.sim.identification.pairing import mac
 from thermospindle.sim.identification.poles import (
     Fit,
@@ -15,8 +16,6 @@ from thermospindle.sim.identification.poles import (
     believed,
     better,
     gain,
-    information,
-    inverted,
     of_shape,
     project,
     realise,
@@ -65,7 +64,7 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
         for trial in (make() for make in (lambda: free, lambda: split(lines, free))):
             fit = refine(lines, start_rank_one(lines, trial), 1e-3)
             constraints, rise = trial.unknowns - fit.unknowns, (fit.chi2 - trial.chi2) / trial.scale()
-            if same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
+            if one_shape(lines, fit, same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95)).any():
                 continue
             if rise < by_noise(lines, constraints):
                 return lines, whole(lines, fit), 1.0
@@ -84,26 +83,34 @@ def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
     """One pole instead of two at one place with one shape; and for each such pair the pole kept and how far its place is spread.
 
     Such a pair is one mode that was not the same in all functions: it moved between the references, or is not linear. The spread is
-    the standard deviation of two places that have the weights of their residues. Where one pole, refined alone, does as well, the second was no
-    more than a step of the search, and nothing is spread.
+    the standard deviation of two places that have the weights of their residues; of one reference, and where the two are not `PARTED`, what their second moment may be, to a standard error. Where one pole, refined alone, does as well,
+    the second was no more than a step of the search, and nothing is spread.
     """
+    alone = lines.frf.shape[1] == 1  # any residues are of rank one
     spread: list[tuple[complex, complex]] = []
     while True:
         shape = np.linalg.svd(free.residues.reshape(-1, *lines.frf.shape[:2]))[0][:, :, 0]
-        pairs = np.argwhere(same_mode(lines, free.poles, shape, 0.8) & believed(lines, free.poles))
+        inside = believed(lines, free.poles)
+        alike = same_mode(lines, free.poles, shape, 0.0 if alone else 0.8) & inside & inside[:, None]
+        imposed = project(lines, free.poles, free.residues, np.ones((len(free.poles), 1), complex)) if alone else free
+        pairs = np.argwhere(one_shape(lines, imposed, alike) if alone else alike)
         if not len(pairs):
             return free, spread
         weaker, kept = sorted(pairs[0], key=lambda r: removal(free)[r])
         size = np.linalg.norm(free.residues[[weaker, kept]], axis=1) / np.linalg.norm(free.residues[[weaker, kept]], axis=1).sum()
+        far = (free.poles[weaker] - free.poles[kept]) * np.sqrt(size.prod())
+        if alone:
+            second, error = second_moment(lines, imposed, kept, weaker)
+            if abs(second) < PARTED * error:
+                far = np.sqrt(abs(second) + error) * np.exp(0.5j * np.angle(second))
         both, free = free, refine(lines, project(lines, np.delete(free.poles, weaker)))
         if better(lines, both, free):
-            spread.append((both.poles[kept], (both.poles[weaker] - both.poles[kept]) * np.sqrt(size.prod())))
+            spread.append((both.poles[kept], far))
 
 
 def same_mode(lines: Lines, poles: ComplexArray, shape: ComplexArray, alike: float) -> NDArray[np.bool_]:
-    """(m, m), upper triangle: pairs of poles closer than their half-width or a line, with shapes (m, n_resp) that are `alike` by MAC."""
-    width = np.maximum((poles.real[:, None] + poles.real) / -2, np.diff(lines.s.imag).min())
-    return np.triu((np.abs(poles[:, None] - poles) < width) & (mac(shape, shape) > alike), 1)
+    """(m, m), upper triangle: pairs of poles `near` each other, with shapes (m, n_resp) that are `alike` by MAC."""
+    return near(lines, poles) & (mac(shape, shape) > alike)
 
 
 def start_rank_one(lines: Lines, free: Fit) -> Fit:
@@ -166,7 +173,7 @@ def by_noise(lines: Lines, unknowns: int) -> float:
 
 def _told_of(lines: Lines, fit: Fit) -> Array:
     """(a,) rise of chi-square without the shape of each pole of rank one, all else following, to second order (Wald's statistic)."""
-    covariance, told = inverted(information(lines, fit)[0]), []
+    covariance, told = covariance_of(lines, fit) / fit.scale(), []
     for r, shape in enumerate(fit.shape):
         x, own = of_shape(fit, r), np.append(shape.real, shape.imag)
         told.append(own @ np.linalg.solve(covariance[np.ix_(x, x)], own))
