@@ -90,19 +90,36 @@ def show_impact(console: Console, step: Step) -> None:
     console.print(f"{_found(step, computed)}\n", highlight=False, markup=False)
     show_grid(console, title, ("f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%"), rows)
     low, high = step.point.spindle.hammer.band
-    unseen = [mode for i, mode in enumerate(step.point.modes) if low <= mode.frequency <= high and i not in identified(step)]
+    shared = _shared(step, computed)
+    for i, k in shared.items():
+        one, other = sorted(mode.frequency for mode in (computed[k], step.point.modes[i]))
+        width = 2 * computed[k].damping_ratio * computed[k].frequency
+        console.print(f"The peak at {m.frequency[k]:.2f} Hz stands for {one:.2f} and {other:.2f} Hz ({computed[k].kind}), which at a width of {width:.3g} Hz this test does not part.", highlight=False)
+    unseen = [mode for i, mode in enumerate(step.point.modes) if low <= mode.frequency <= high and i not in identified(step) and i not in shared]
     if unseen:
         console.print(f"No peak was found of {', '.join(f'{m.frequency:.2f} Hz ({m.kind})' for m in unseen)}. {_struck(step.point.spindle)}")
 
 
+def _shared(step: Step, computed: Mapping[int, Mode]) -> dict[int, int]:
+    """By the number of a mode of the model without a peak of its own that of the identified one which stands for it, too: one of the same kind, nearer than a half-width."""
+    seen, found = identified(step), {}
+    for i, mode in enumerate(step.point.modes):
+        near = {k: abs(own.pole - mode.pole) for k, own in computed.items() if own.kind == mode.kind and abs(own.pole - mode.pole) < -own.pole.real}
+        if i not in seen and near:
+            found[i] = min(near, key=lambda k: near[k])
+    return found
+
+
 def _found(step: Step, computed: Mapping[int, Mode]) -> str:
-    """How many modes the test shows of those that the model has in the band, and where it is furthest off."""
+    """How many modes the test shows of those that the model has in the band, and where it is furthest off of those that have a peak of their own."""
     low, high = step.point.spindle.hammer.band
     count = sum(low <= mode.frequency <= high for mode in step.point.modes)
     found = f"{len(step.identified.frequency)} modes were found, {len(computed)} of the {count} that the model has from {low:g} to {high:g} Hz"
-    if not computed:
+    shared = _shared(step, computed).values()
+    alone = {k: mode for k, mode in computed.items() if k not in shared}
+    if not alone:
         return f"{found}."
-    k, mode = max(computed.items(), key=lambda row: abs(step.identified.frequency[row[0]] / row[1].frequency - 1))
+    k, mode = max(alone.items(), key=lambda row: abs(step.identified.frequency[row[0]] / row[1].frequency - 1))
     off, sd = step.identified.frequency[k] - mode.frequency, step.identified.frequency_sd[k]
     return f"{found}; furthest off is that at {mode.frequency:.2f} Hz, by {off:+.2g} Hz ({100 * off / mode.frequency:+.2g} %, {abs(off) / sd:.1f} of its standard errors)."
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -96,6 +97,27 @@ def test_modes_that_an_impact_test_does_not_show_are_named(run: Run):
     said = re.search(r"No peak was found of (.*?)\. The hammer strikes", " ".join(out.getvalue().split()))
     assert said is not None
     assert said[1].split(", ") == [f"{m.frequency:.2f} Hz ({m.kind})" for m in unseen]
+
+
+def test_a_peak_that_stands_for_two_modes_says_so(run: Run):
+    """The second of a pair nearer than a half-width is not merely unseen, and the one that took its peak is not what is furthest off."""
+    step = run.steps[0]
+    number, k = next((i, k) for i, k in identified(step).items())
+    mode = step.point.modes[number]
+    pole = mode.pole - 0.5j * mode.pole.real
+    beside = replace(mode, pole=pole, frequency=abs(pole) / (2 * np.pi))
+    band = run.spindle.hammer.band
+    paired = replace(step, point=replace(step.point))
+    vars(paired.point)["modes"] = [*step.point.modes, beside]
+    assert band[0] <= beside.frequency <= band[1]
+    out = StringIO()
+    show_impact(Console(file=out, width=400), paired)
+    said = " ".join(out.getvalue().split())
+    width = 2 * mode.damping_ratio * mode.frequency
+    pair = f"{mode.frequency:.2f} and {beside.frequency:.2f} Hz ({mode.kind})"
+    assert f"The peak at {step.identified.frequency[k]:.2f} Hz stands for {pair}, which at a width of {width:.3g} Hz this test does not part." in said
+    assert f"{beside.frequency:.2f} Hz" not in said.split("No peak was found of", 1)[-1]
+    assert f"furthest off is that at {mode.frequency:.2f} Hz" not in said
 
 
 def test_a_standard_error_is_never_shown_as_none(run: Run):
