@@ -36,7 +36,7 @@ class Region:
     z: tuple[float, float]
     role: str = ""  # shaft, hub, insert or support: what effects know it by; empty for none of these
 
-    @property
+    @cached_property
     def outline(self) -> Region:
         """Itself without a material and a role: spindles whose outlines are equal have the same sections."""
         return replace(self, material="", role="")
