@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 
 from thermospindle.model.files.stiffness_table import write_table
@@ -19,6 +20,8 @@ from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.identification.numbering import identified, measured_rows, numbered
 from thermospindle.sim.operating import provenance, stiffness_table
 from thermospindle.sim.run import Run, Step, as_campaign
+
+MUCH = 0.1  # of what a hammer moves and sensors see of one mode, from which another near it has a part in its peak
 
 # ---------------------------------------------------------------- JSON
 
@@ -82,40 +85,42 @@ def show_impact(console: Console, step: Step) -> None:
     title = f"Impact test at {condition.temperature:g} C, {condition.speed / RPM:g} rpm: identified modes beside the model's own"
     rows = []
     m = step.identified
-    computed = {k: step.point.modes[i] for i, k in identified(step).items()}
+    seen = identified(step)
+    computed, shared = {k: step.point.modes[i] for i, k in seen.items()}, _shared(step, seen)
     for i, (f, sf, z, sz) in enumerate(zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)):
         exact = computed.get(i)
         own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:.3f}")
         rows.append([f"{f:.2f}", _error(sf, 2), f"{100 * z:.3f}", _error(100 * sz, 3), *own])
-    console.print(f"{_found(step, computed)}\n", highlight=False, markup=False)
+    console.print(f"{_found(step, computed, set(shared.values()))}\n", highlight=False, markup=False)
     show_grid(console, title, ("f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%"), rows)
     low, high = step.point.spindle.hammer.band
-    shared = _shared(step, computed)
     for i, k in shared.items():
         one, other = sorted(mode.frequency for mode in (computed[k], step.point.modes[i]))
         width = 2 * computed[k].damping_ratio * computed[k].frequency
         console.print(f"The peak at {m.frequency[k]:.2f} Hz stands for {one:.2f} and {other:.2f} Hz ({computed[k].kind}), which at a width of {width:.3g} Hz this test does not part.", highlight=False)
-    unseen = [mode for i, mode in enumerate(step.point.modes) if low <= mode.frequency <= high and i not in identified(step) and i not in shared]
+    unseen = [mode for i, mode in enumerate(step.point.modes) if low <= mode.frequency <= high and i not in seen and i not in shared]
     if unseen:
         console.print(f"No peak was found of {', '.join(f'{m.frequency:.2f} Hz ({m.kind})' for m in unseen)}. {_struck(step.point.spindle)}")
 
 
-def _shared(step: Step, computed: Mapping[int, Mode]) -> dict[int, int]:
-    """By the number of a mode of the model without a peak of its own that of the identified one which stands for it, too: one of the same kind, nearer than a half-width."""
-    seen, found = identified(step), {}
-    for i, mode in enumerate(step.point.modes):
-        near = {k: abs(own.pole - mode.pole) for k, own in computed.items() if own.kind == mode.kind and abs(own.pole - mode.pole) < -own.pole.real}
-        if i not in seen and near:
-            found[i] = min(near, key=lambda k: near[k])
+def _shared(step: Step, seen: Mapping[int, int]) -> dict[int, int]:
+    """By the number of a mode of the model without a peak of its own that of the identified one which stands for it, too: one nearer than a half-width, and farther than its error, of a mode that
+    this test does not move and see more than ten times as much."""
+    modes, chain, found = step.point.modes, step.point.measurement, dict[int, int]()
+    moved = [np.linalg.norm(chain.reference_rows @ m.shape) * np.linalg.norm(chain.response_rows @ m.shape) for m in modes]
+    for i in set(range(len(modes))) - set(seen):
+        apart = {j: abs(modes[j].pole - modes[i].pole) for j in seen if moved[i] > MUCH * moved[j]}
+        near = [j for j, far in apart.items() if 2 * np.pi * step.identified.frequency_sd[seen[j]] < far < -modes[j].pole.real]
+        if near:
+            found[i] = seen[min(near, key=lambda j: apart[j])]
     return found
 
 
-def _found(step: Step, computed: Mapping[int, Mode]) -> str:
+def _found(step: Step, computed: Mapping[int, Mode], shared: Set[int]) -> str:
     """How many modes the test shows of those that the model has in the band, and where it is furthest off of those that have a peak of their own."""
     low, high = step.point.spindle.hammer.band
     count = sum(low <= mode.frequency <= high for mode in step.point.modes)
     found = f"{len(step.identified.frequency)} modes were found, {len(computed)} of the {count} that the model has from {low:g} to {high:g} Hz"
-    shared = _shared(step, computed).values()
     alone = {k: mode for k, mode in computed.items() if k not in shared}
     if not alone:
         return f"{found}."

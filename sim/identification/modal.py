@@ -15,7 +15,8 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.identification.close_poles import PARTED, near, second_moment
+from thermospindle.sim.identification.close_poles import beyond_first_order, near
+from thermospindle.sim.identification.pairing import mac
 from thermospindle.sim.identification.poles import Fit, Lines, believed, information, of_shape, search
 from thermospindle.sim.identification.rank_one import accepted
 
@@ -26,6 +27,9 @@ STEP, SURE = 0.3, 5.0
 """Of an FRF, from one line to the next, and of its standard errors, from which it changes much."""
 FAINT = 4.0
 """A mode is reported if its squared shape, weighted by its information, exceeds this many times what the information criterion asks."""
+
+TOGETHER = 0.95
+"""By MAC, of the participations of two modes that the references excite alike, so that these are as good as one in telling the two apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +103,7 @@ def extract(
     Without `frf_sd` it is taken from the `scatter` of neighbouring lines, as the status records. Lines at 0 Hz are left out. Records
     under an exponential window exp(-window_decay t), 1/s, give H at s = i w + window_decay, and are taken so. Of more than `MOST_LINES` one in so many
     is taken where FRFs change little. Not reported
-    are modes out of the band or with a damping that is not `BELIEVED`, not known better than to their half-width, or `FAINT`.
+    are modes out of the band or with a damping that is not `BELIEVED`, `FAINT`, or not known better than to their half-width by the fit alone: what enlarges errors beyond that takes none away.
     Raises ValueError if shapes do not agree or numbers are unusable.
     """
     frequency, frf = np.asarray(frequency, float), np.asarray(frf, complex)
@@ -211,13 +215,12 @@ def _modes(
             ways = jacobian[:, [there[0], a + there[0]]] @ [[offset.real, offset.imag], [offset.imag, 0.0]]  # two places side by side are a broader peak, too
             spread += ways @ ways.T
             moved += 1
-    mixed = 0
-    for i, j in np.argwhere(near(lines, poles)) if width == responses and fit.participation.shape[1] == 1 else ():
-        second, error = second_moment(lines, fit, i, j)
-        if abs(second) < PARTED * error:
+    mixed = np.zeros(a, bool)
+    for i, j in np.argwhere(near(lines, poles) & (mac(fit.participation, fit.participation) > TOGETHER)):
+        if lacking := beyond_first_order(lines, fit, i, j):
             for r in (i, j):
-                spread += error * jacobian[:, [r, a + r]] @ jacobian[:, [r, a + r]].T
-            mixed += 1
+                spread += lacking * jacobian[:, [r, a + r]] @ jacobian[:, [r, a + r]].T
+                mixed[r] = True
     keep = np.flatnonzero(sure)[np.argsort(frequency[sure])]
     kept = np.append(keep, a + keep)
     chi2 = fit.chi2 / (lines.count - fit.unknowns)
@@ -227,7 +230,7 @@ def _modes(
     words += [] if strain else ["residues of rank one refused by the data, left free"]
     words += [f"residues of rank one strained, errors enlarged by {np.sqrt(strain):.2g}"] if strain > 1 else []
     words += [f"{moved} mode{'s' * (moved > 1)} at two places with one shape, errors enlarged by their distance"] if moved else []
-    words += [f"{mixed} pair{'s' * (mixed > 1)} of modes hardly apart, errors enlarged by what their distance may be"] if mixed else []
+    words += [f"{mixed[sure].sum()} modes hardly apart from a neighbour, errors enlarged by how far they may be"] if mixed[sure].any() else []
     words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
     edges = np.round(lines.s.imag[[0, -1]] * unit / (2 * np.pi), 6)
     return Modes(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.identification.close_poles import PARTED, covariance_of, near, one_shape, second_moment
+from thermospindle.sim.identification.close_poles import PARTED, near, one_shape, second_moment
 from thermospindle.sim.identification.pairing import mac
 from thermospindle.sim.identification.poles import (
     Fit,
@@ -16,6 +16,8 @@ from thermospindle.sim.identification.poles import (
     believed,
     better,
     gain,
+    information,
+    inverted,
     of_shape,
     project,
     realise,
@@ -83,24 +85,28 @@ def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
     """One pole instead of two at one place with one shape; and for each such pair the pole kept and how far its place is spread.
 
     Such a pair is one mode that was not the same in all functions: it moved between the references, or is not linear. The spread is
-    the standard deviation of two places that have the weights of their residues; of one reference, and where the two are not `PARTED`, what their second moment may be, to a standard error. Where one pole, refined alone, does as well,
-    the second was no more than a step of the search, and nothing is spread.
+    the standard deviation of two places that have the weights of their residues. Of one reference it is the root of what their second moment may be, to a standard error, where that is
+    not `PARTED` from nothing. Where one pole, refined alone, does as well, the second was no more than a step of the search, and nothing is spread.
+
+    Of one sensor and several hammers a mode that moved between these and two that each excites otherwise are the same numbers; they are taken for the first.
     """
-    alone = lines.frf.shape[1] == 1  # any residues are of rank one
+    alone = lines.frf.shape[1] == 1  # any residues are of rank one, and shapes
     spread: list[tuple[complex, complex]] = []
     while True:
-        shape = np.linalg.svd(free.residues.reshape(-1, *lines.frf.shape[:2]))[0][:, :, 0]
         inside = believed(lines, free.poles)
-        alike = same_mode(lines, free.poles, shape, 0.0 if alone else 0.8) & inside & inside[:, None]
-        imposed = project(lines, free.poles, free.residues, np.ones((len(free.poles), 1), complex)) if alone else free
-        pairs = np.argwhere(one_shape(lines, imposed, alike) if alone else alike)
+        alike = near(lines, free.poles) & inside & inside[:, None]
+        if alone and alike.any():
+            alike = one_shape(lines, project(lines, free.poles, free.residues, np.ones((len(free.poles), 1), complex)), alike)
+        elif not alone:
+            alike &= same_mode(lines, free.poles, np.linalg.svd(free.residues.reshape(-1, *lines.frf.shape[:2]))[0][:, :, 0], 0.8)
+        pairs = np.argwhere(alike)
         if not len(pairs):
             return free, spread
         weaker, kept = sorted(pairs[0], key=lambda r: removal(free)[r])
         size = np.linalg.norm(free.residues[[weaker, kept]], axis=1) / np.linalg.norm(free.residues[[weaker, kept]], axis=1).sum()
         far = (free.poles[weaker] - free.poles[kept]) * np.sqrt(size.prod())
         if alone:
-            second, error = second_moment(lines, imposed, kept, weaker)
+            second, error = second_moment(lines, free, kept, weaker)
             if abs(second) < PARTED * error:
                 far = np.sqrt(abs(second) + error) * np.exp(0.5j * np.angle(second))
         both, free = free, refine(lines, project(lines, np.delete(free.poles, weaker)))
@@ -143,7 +149,7 @@ def completed(lines: Lines, fit: Fit) -> Fit:
         u, size, v = np.linalg.svd(beside.residues[-1].reshape(responses, references))
         poles = np.insert(fit.poles, len(fit.shape), new)
         trial = refine(lines, project(lines, poles, np.vstack([fit.shape, u[:, 0] * size[0]]), np.vstack([fit.participation, v[0]])), SOON)
-        twice = same_mode(lines, trial.poles[: len(trial.shape)], trial.shape, 0.95).any()  # a mode that is at two places is no other
+        twice = same_mode(lines, trial.poles[: len(trial.shape)], trial.shape, 0.95)[:, -1].any()  # a mode that is at two places is no other
         if twice or fit.chi2 - trial.chi2 < least * trial.scale():
             break
         fit = refine(lines, trial, 1e-3)
@@ -173,7 +179,7 @@ def by_noise(lines: Lines, unknowns: int) -> float:
 
 def _told_of(lines: Lines, fit: Fit) -> Array:
     """(a,) rise of chi-square without the shape of each pole of rank one, all else following, to second order (Wald's statistic)."""
-    covariance, told = covariance_of(lines, fit) / fit.scale(), []
+    covariance, told = inverted(information(lines, fit)[0]), []
     for r, shape in enumerate(fit.shape):
         x, own = of_shape(fit, r), np.append(shape.real, shape.imag)
         told.append(own @ np.linalg.solve(covariance[np.ix_(x, x)], own))
