@@ -233,17 +233,12 @@ def _question(spindle: Spindle, part: str, tolerance: float, temperatures: Mappi
 
 @lru_cache(maxsize=64)
 def _kept(question: Elastic) -> tuple[Response, Convergence]:
+    if (found := store.load(repr(question))) is not None:
+        return found
     size = max(np.ptp([g.r for g in question.regions]), np.ptp([g.z for g in question.regions])) / CELLS_ACROSS
     heights = [race.z for race in question.races if race.z is not None]
-    return _stored(repr(question), lambda: _answer(question, tiled(question.part, question.regions, size, heights=heights)))
-
-
-def _stored(key: str, worked_out: Callable[[], tuple[Response, Convergence]]) -> tuple[Response, Convergence]:
-    """What is kept on disk under a key, or is `worked_out` and kept."""
-    if (found := store.load(key)) is not None:
-        return found
-    answer = worked_out()
-    store.save(key, *answer)
+    answer = _answer(question, tiled(question.part, question.regions, size, heights=heights))
+    store.save(repr(question), *answer)
     return answer
 
 

@@ -108,7 +108,7 @@ def _shared(step: Step, seen: Mapping[int, int]) -> dict[int, int]:
     this test does not move and see more than ten times as much."""
     modes, chain, found = step.point.modes, step.point.measurement, dict[int, int]()
     moved = [np.linalg.norm(chain.reference_rows @ m.shape) * np.linalg.norm(chain.response_rows @ m.shape) for m in modes]
-    for i in set(range(len(modes))) - set(seen):
+    for i in (i for i in range(len(modes)) if i not in seen):
         apart = {j: abs(modes[j].pole - modes[i].pole) for j in seen if moved[i] > MUCH * moved[j]}
         near = [j for j, far in apart.items() if 2 * np.pi * step.identified.frequency_sd[seen[j]] < far < -modes[j].pole.real]
         if near:
