@@ -233,12 +233,13 @@ def _question(spindle: Spindle, part: str, tolerance: float, temperatures: Mappi
 
 @lru_cache(maxsize=64)
 def _kept(question: Elastic) -> tuple[Response, Convergence]:
-    if (found := store.load(repr(question))) is not None:
+    key = repr(question)
+    if (found := store.load(key)) is not None:
         return found
     size = max(np.ptp([g.r for g in question.regions]), np.ptp([g.z for g in question.regions])) / CELLS_ACROSS
     heights = [race.z for race in question.races if race.z is not None]
     answer = _answer(question, tiled(question.part, question.regions, size, heights=heights))
-    store.save(repr(question), *answer)
+    store.save(key, *answer)
     return answer
 
 
