@@ -186,11 +186,12 @@ def nuisances(
     found += [Nuisance(UNEVEN, u.name, t.structure / np.sqrt(2), index=i) for i, u in enumerate(unevennesses(spindle))]  # of two that are off by as much each
     found += [Nuisance(MASSES, m.name, m.sd) for m in mass_terms(spindle)]
     found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
-    for i in range(modes.seen):
+    for i in range(len(modes.omega) if with_lines else modes.seen):
         for j in range(i, len(modes.omega) if with_lines else i + 1):
             of = f"mode {i + 1}" if i == j else f"modes {i + 1} and {j + 1}"
             found.append(Nuisance(STIFFNESS, f"stiffness discrepancy of {of}", STIFFNESS_SD, modes=(i, j)))
-            found.append(Nuisance(DAMPING, f"damping discrepancy of {of}", DAMPING_SD, modes=(i, j)))
+            if i < modes.seen:  # beyond the band a mode is a spring
+                found.append(Nuisance(DAMPING, f"damping discrepancy of {of}", DAMPING_SD, modes=(i, j)))
     drifting = list(enumerate(tests)) if len(tests) > 1 else []  # one test shows no drift
     for k, name in drifting:
         for i in range(modes.seen):

@@ -180,6 +180,25 @@ def test_column_of_an_effect_on_matrices(scene):
     assert np.linalg.norm(found - wanted) < 0.5 * np.linalg.norm(secant - wanted)
 
 
+def test_modes_beyond_the_band_may_be_wrong_too(scene):
+    """By their stiffness, which lends the band a spring: as the lines of a dense model have it whose stiffness is off along one of them. Not by their damping."""
+    model, _ = made(scene, frequency=np.arange(400.0, 2400.1, 20.0), noise=NOISELESS)
+    seen, modes = model.reference.seen, len(model.reference.omega)
+    assert 0 < seen < modes
+    every = {(i, j) for i in range(modes) for j in range(i, modes)}
+    own = {kind: {p.modes for p in model.parameters if p.kind == kind} for kind in (kinds_of.STIFFNESS, kinds_of.DAMPING)}
+    assert own == {kinds_of.STIFFNESS: every, kinds_of.DAMPING: {pair for pair in every if pair[0] < seen}}
+
+    drawn_as = np.zeros(len(model.parameters))
+    i = next(i for i, p in enumerate(model.parameters) if p.kind == kinds_of.STIFFNESS and p.modes == (seen, seen))
+    off = drawn_as + 10.0 * (np.arange(len(drawn_as)) == i)  # tenfold the width: a mode off by 1 %
+    plain, softer = (model.linear(0, x, []).matrices for x in (drawn_as, off))
+    along = model.reference.over(plain.dofs)[:, seen] * model.reference.omega[seen]
+    wanted = plain.stiffness + 10.0 * 2 * kinds_of.STIFFNESS_SD * np.outer(along, along)
+    assert softer.stiffness == pytest.approx(wanted, rel=1e-6, abs=1e-9 * np.abs(wanted).max())
+    assert np.linalg.norm(model.residual(0, off, []) - model.residual(0, drawn_as, [])) > 1.0
+
+
 def test_the_truth_leaves_noise(scene):
     """At what was drawn chi2 is 1 a number, for lines and for tables: model, window, quantity and gains are those of the virtual test."""
     errors = drawn(scene, 2, 5)
