@@ -203,7 +203,7 @@ def _effect_table(effect: Effect, row: Added) -> str:
 def _lawless(effect: Effect, answer: Answer, diagnosis: Path) -> str:
     name, size = effect.name, effect.parameters[0].name
     drafts = f": spindle draft {diagnosis} --element {name} writes an effect with theirs" if name in answer.drafted else ""
-    return f"the data have another law than {name} assumes, and {size} is its mean over the tests{drafts}"
+    return f"the data have another law than {name} assumes, and {size} is one for all tests with the law assumed{drafts}"
 
 
 def _with_others(effects: Sequence[Effect], answer: Answer, offered: Offered, diagnosis: Path) -> list[str]:

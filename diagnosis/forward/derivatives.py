@@ -14,7 +14,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.linear import Linear, Pairs, Rates, pairs, products, same_chain, together
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.points import Applied, aside
+from thermospindle.diagnosis.forward.points import Applied, aside, askew
 from thermospindle.diagnosis.forward.response import Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.types import Array, ComplexArray, Integers
@@ -66,7 +66,8 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     record = [] if model.numbers.record is None else [model.numbers.record]
     lights = model.lights(t, linear.matrices.dofs, x)
     channels, hammers, ways = (_alike(model, *which[t]) for which in (model.numbers.gains, model.numbers.hammers, model.numbers.misses))
-    shared += [channels, hammers, ways, _each(np.array(record, int)), *(_alike(model, n, n) for _, n in lights)]
+    glued = _alike(model, *model.numbers.sensors)
+    shared += [channels, hammers, ways, glued, _each(np.array(record, int)), *(_alike(model, n, n) for _, n in lights)]
     numbers, of, times = _after_each_other(shared)
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd
@@ -90,6 +91,13 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
         for n in np.flatnonzero(way // 2 == struck_by[ref]):
             jacobian[at + n, :, ref] = missed[:, way[n] % 2].view(float)
     at += len(way)
+    channel, off = np.divmod(np.unique(model.numbers.sensors[1]), 4)
+    for w, rows in enumerate(askew(model.operating(t, x, effects))[:, :n_resp]):
+        heard = (response.heard(rows) * weight).view(float)
+        for n in np.flatnonzero(off == w):
+            own = model.numbers.channel_of[t][:n_resp] == channel[n]
+            jacobian[at + n, own] = heard[own]
+    at += len(channel)
     if record:
         at = fill(at, response.cut_off[None])
     for light, _ in lights:

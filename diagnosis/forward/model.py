@@ -15,7 +15,7 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward.latest import Latest
 from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_between, mass_changes
-from thermospindle.diagnosis.forward.points import Applied, aside, replace_measuring, undrawn
+from thermospindle.diagnosis.forward.points import Applied, aside, askew, replace_measuring, undrawn
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
@@ -189,12 +189,24 @@ class CampaignModel:
         stiffness, damping = self._discrepancy(t, bare, x)
         mass, gyroscopic = self._otherwise_heavy(x, bare.dofs)
         whole = Matrices(bare.mass + mass, bare.damping + damping + point.chain.speed * gyroscopic, bare.stiffness + stiffness, bare.dofs)
-        return Linear(whole, self._struck(t, point, x), point.chain.layout, between)
+        return Linear(whole, self._measured(t, point, x), point.chain.layout, between)
 
-    def _struck(self, t: int, point: OperatingPoint, x: Array) -> Measurement:
-        """The measuring chain of a point, whose hammers miss theirs and have gains of their own."""
+    def _measured(self, t: int, point: OperatingPoint, x: Array) -> Measurement:
+        """The measuring chain of a point, whose sensors are off their places and directions, and whose hammers miss theirs and have gains of their own."""
+        return self._struck(t, point, self._heard(t, point, x), x)
+
+    def _heard(self, t: int, point: OperatingPoint, x: Array) -> Measurement:
+        (number, which), of, chain = self.numbers.sensors, self.numbers.channel_of[t], point.measurement
+        if not (len(of) and x[number].any()):
+            return chain
+        off = np.bincount(which, x[number] * self.sd[number]).reshape(-1, 4)[of]  # of every sensor, each way
+        rows = chain.response_rows.copy()
+        rows[: len(of)] += np.einsum("rw,wrn->rn", off, askew(point)[:, : len(of)])
+        return changed(chain, response_rows=rows)
+
+    def _struck(self, t: int, point: OperatingPoint, chain: Measurement, x: Array) -> Measurement:
         (number, which), of = self.numbers.misses[t], self.numbers.hammer_of[t]
-        chain, gain = point.measurement, self.hammer_gain(t, x)
+        gain = self.hammer_gain(t, x)
         if not (len(gain) and (x[number].any() or (gain != 1.0).any())):
             return chain
         missed = np.bincount(which, x[number] * self.sd[number], 2 * (of.max() + 1)).reshape(-1, 2)  # of every hammer, either way

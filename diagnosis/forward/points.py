@@ -40,11 +40,33 @@ def aside(point: OperatingPoint) -> Array:
     return _aside(point.chain.layout, tuple(point.spindle.point(node) for node in point.spindle.hammer.hammer_nodes))
 
 
+def askew(point: OperatingPoint) -> Array:
+    """How the rows of its points change a metre beside their places, the two ways on the face they lie on, and a radian out of their directions towards these (4, points, n)."""
+    return _askew(point.chain.layout, point.spindle.points)
+
+
+WAYS = 0.0, np.pi / 2  # on a face
+
+
 @lru_cache(maxsize=256)
 def _aside(layout: Layout, aimed: tuple[Point, ...]) -> Array:
-    found = np.array([[row_of(layout, off(p, STEP, way)) - row_of(layout, p) for p in aimed] for way in (0.0, np.pi / 2)]) / STEP
+    found = np.array([[row_of(layout, off(p, STEP, way)) - row_of(layout, p) for p in aimed] for way in WAYS]) / STEP
     found.flags.writeable = False
     return found
+
+
+@lru_cache(maxsize=256)
+def _askew(layout: Layout, sensors: tuple[Point, ...]) -> Array:
+    turned = np.array([[row_of(layout, changed(p, direction=_towards(p, way))) for p in sensors] for way in WAYS])
+    found = np.concatenate([_aside(layout, sensors), turned])
+    found.flags.writeable = False
+    return found
+
+
+def _towards(p: Point, way: float) -> tuple[float, float, float]:
+    """The unit vector of a `way` on the face that a point lies on."""
+    x, y, z = np.subtract(off(p, 1.0, way).position, p.position)
+    return float(x), float(y), float(z)
 
 
 Told = Sequence[tuple[Nuisance, float]]

@@ -10,7 +10,8 @@ stiffness has (V^-1 dA V)_ij = -(l_i u) p_j^q (v r_j), l and r the left and righ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,7 +24,7 @@ CLOSE = 1e-5  # times 1 / T, below which two poles' difference is their derivati
 @dataclass(frozen=True, eq=False)
 class RecordEnd:
     """The end of records, `duration` T seconds after the hit: `poles` p, with `force` (n, n_ref) of the references on them and `at_end` (n,) e^((p - w) T); of those
-    `seen` at the end `away` (k, L), (s - p) e^(-i omega t0), and `read` (k, n_resp, L), what responses read of their velocity."""
+    `seen` at the end `away` (k, L), (s - p) e^(-i omega t0), and what responses read of a velocity, `factor` (n_resp, L) of their `rows` (n_resp, r)."""
 
     duration: float
     poles: Poles
@@ -31,7 +32,17 @@ class RecordEnd:
     at_end: ComplexArray
     seen: Integers
     away: ComplexArray
-    read: ComplexArray
+    factor: ComplexArray
+    rows: Array
+
+    @cached_property
+    def read(self) -> ComplexArray:
+        """What responses read of the velocity of the poles seen, (k, n_resp, L)."""
+        return np.asarray((self.rows @ (self.poles.right * self.poles.value)[:, self.seen]).T[:, :, None] * self.factor / self.away[:, None, :])
+
+    def read_by(self, rows: Array) -> RecordEnd:
+        """The same end, read by other rows (n_resp, r)."""
+        return replace(self, rows=rows)
 
     @property
     def value(self) -> ComplexArray:

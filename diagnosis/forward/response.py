@@ -135,8 +135,8 @@ class Response:
         at_end = np.exp(np.minimum((p.value.real - window) * after, 0.0) + 1j * p.value.imag * after)
         seen = np.flatnonzero(np.abs(at_end) > SILENT)
         away = (self.s[None, :] - p.value[seen, None]) * np.exp(-2j * np.pi * data.frequency * before)
-        read = (self._rows @ (p.right * p.value)[:, seen]).T[:, :, None] * (self.factor / self.s) / away[:, None, :]
-        return RecordEnd(after, p, p.left @ self._references, at_end, seen, away, read) if len(seen) else None
+        end = RecordEnd(after, p, p.left @ self._references, at_end, seen, away, self.factor / self.s, self._rows)
+        return end if len(seen) else None
 
     @property
     def _late(self) -> RecordEnd | None:
@@ -233,6 +233,12 @@ class Response:
         columns = self.over(rows.T)
         found = self.read(columns).transpose(1, 0, 2)
         return found if (end := self._late) is None else found + self._cut * end.of(end.poles.left @ columns)
+
+    def heard(self, rows: Array) -> ComplexArray:
+        """What responses would read by as much as their rows are `rows` (n_resp, n) more, (n_resp, n_ref, L), less what of it comes after the records' end."""
+        columns = self.over(rows.T)
+        found = _over(columns, self._driven) * self.factor[:, None]
+        return found if (end := self._late) is None else found + self._cut * end.read_by(columns.T).value
 
     def driven(self, columns: Array, power: Integers) -> ComplexArray:
         """The force (m, n_ref, L) that appears on one vector where s^`power` times it and `columns` (r, m) is added to the dynamic stiffness, less what

@@ -41,6 +41,11 @@ MISS, MISS_DRIFT, MISS_SD, MISS_DRIFT_SD = "miss of a hammer", "drift of a hamme
 """How far (m) from its point a hammer hits on the mean: in all tests, and from test to test at the reference width. By hand a tip meets its mark to some tenths of a millimetre, which
 at a radius of 12 mm is a per cent of the moment."""
 WAYS = ("outwards, or upwards on a side", "around the axis")
+PLACE, PLACE_SD = "place of a sensor", 3e-4
+"""How far (m) a sensor sits from its point, the same in all tests: glued or aimed by eye, to some tenths of a millimetre."""
+ASKEW, ASKEW_SD = "direction of a sensor", 0.02
+"""By how much (rad) it is turned out of its direction, the same in all tests: a degree of glueing, and a transverse sensitivity of one to three per cent by accelerometers' data sheets (at most 5 %
+is usual), which is the same to an FRF."""
 BALLS = "stiffness of the balls"
 FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
 """Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
@@ -83,7 +88,7 @@ class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
     `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain: sensors in the order in which tests first have them), the hammer, of a
-    miss twice that and its way, the material (`Spindle.used_materials`), or unused; `modes` the pair of a discrepancy.
+    miss twice that and its way, of a sensor's place and direction four times its channel and one of four ways, the material (`Spindle.used_materials`), or unused; `modes` the pair of a discrepancy.
     """
 
     kind: str
@@ -202,6 +207,9 @@ def nuisances(
         found += [Nuisance(DRIFT, f"gain of channel {c + 1} in {name}", DRIFT_SD, test=k, index=c) for k, name in drifting for c in range(channels)]
         found += [Nuisance(HAMMER, f"gain of hammer {h + 1}", t.gain, index=h) for h in range(hammers) if hammers > 1]  # of one alone that of all channels
         found += [Nuisance(HAMMER_DRIFT, f"gain of hammer {h + 1} in {name}", DRIFT_SD, test=k, index=h) for k, name in drifting for h in range(hammers)]
+        for c in range(channels):
+            found += [Nuisance(PLACE, f"place of channel {c + 1} {way}", PLACE_SD, index=4 * c + i) for i, way in enumerate(WAYS)]
+            found += [Nuisance(ASKEW, f"direction of channel {c + 1} {way}", ASKEW_SD, index=4 * c + 2 + i) for i, way in enumerate(WAYS)]
         ways = [(2 * h + i, f"miss of hammer {h + 1} {way}") for h in range(hammers) for i, way in enumerate(WAYS)]
         found += [Nuisance(MISS, of, MISS_SD, index=i) for i, of in ways]
         found += [Nuisance(MISS_DRIFT, f"{of} in {name}", MISS_DRIFT_SD, test=k, index=i) for k, name in drifting for i, of in ways]

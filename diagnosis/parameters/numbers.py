@@ -131,6 +131,12 @@ class Numbers:
         """For every test the numbers of the parameters by which hammers miss, and twice the hammer with the way of each."""
         return [self._of_one_and_all(t, kinds_of.MISS, kinds_of.MISS_DRIFT) for t in range(len(self.tests))]
 
+    @cached_property
+    def sensors(self) -> tuple[Integers, Integers]:
+        """The numbers of the parameters by which sensors are off their places and directions, and four times the channel with the way of each."""
+        own = self._of(kinds_of.PLACE, kinds_of.ASKEW)
+        return own, self.places[1][own]
+
     def _of_one_and_all(self, t: int, in_all: str, in_one: str) -> tuple[Integers, Integers]:
         rows = [(i, p.index) for i, p in enumerate(self.parameters) if p.kind == in_all or (p.kind == in_one and p.test == t)]
         number, index = np.array(rows, int).reshape(-1, 2).T

@@ -11,7 +11,7 @@ import numpy as np
 
 from tests.blind.hidden import Hidden
 from tests.blind.laws import REFERENCE
-from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_struck, ways_of_mass
+from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_read, points_struck, ways_of_mass
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, HammerTest, Spindle
 from thermospindle.model.types import Array
@@ -24,6 +24,8 @@ HAMMERS_FROM = 2000
 MASSES_FROM = 2140
 """The first seed in whose world bodies have their mass otherwise than drawn."""
 
+SENSORS_FROM = 2900
+"""The first seed in whose world sensors sit beside their points and look askew."""
 
 BY_HAND = 2e-4
 """How far (m) from its point a hammer is known to hit before its misses are told from each other, of the two that worlds have."""
@@ -79,9 +81,12 @@ def drawn_world(random: np.random.Generator, spindle: Spindle) -> World:
 
 def further(world: World, seed: int, spindle: Spindle) -> World:
     """With what worlds have from seed `HAMMERS_FROM` on: thermal motions that are off by a per cent, hammers whose force is off and drifts and that hit beside their points, another way in each
-    test; and from `MASSES_FROM` on bodies that have their mass otherwise, by some thousandths."""
+    test; from `MASSES_FROM` on bodies that have their mass otherwise, by some thousandths; and from `SENSORS_FROM` on sensors that are glued by hand."""
     if seed < HAMMERS_FROM:
         return world
+    if seed >= SENSORS_FROM:
+        glued = np.random.default_rng([seed, 97])
+        world = replace(world, place=float(glued.choice([1e-4, 4e-4])), askew=float(glued.choice([5e-3, 0.02, 0.03])))
     if seed >= MASSES_FROM:
         own = np.random.default_rng([seed, 89])
         world = replace(world, masses=tuple((float(own.choice([1e-3, 3e-3, 6e-3])) * own.standard_normal(ways_of_mass(spindle))).tolist()))
@@ -118,12 +123,14 @@ def campaign(
     aimed, faces = points_struck(spindle), faces_struck(spindle)
     force = 1 + world.hammer_gain * hits.standard_normal(len(aimed))
     aimed = aimed + beside(faces, world.miss * hits.standard_normal((len(aimed), 2)))
+    off = np.random.default_rng([seed, 101]).standard_normal((2, len(spindle.points), 2))
+    sensors = glued(spindle, world.place * off[0], world.askew * off[1])
     hidden = in_contact(built, tests, world, hidden)
     made = []
     for k, plan in enumerate(tests):
         true = plan.temperature + spindle.tolerances.temperature * random.standard_normal()
         struck = aimed + beside(faces, world.miss_drift * hits.standard_normal((len(aimed), 2)))
-        at = answer(built, Condition(true, plan.speed), world, hidden, plan.place(spindle), struck)
+        at = answer(built, Condition(true, plan.speed), world, hidden, plan.place(spindle), struck, sensors)
         drift = 1 + world.gain_drift * random.standard_normal(len(gain))
         hit = force * (1 + world.hammer_drift * hits.standard_normal(len(force)))
         frf = measured(replace(at, gain=at.gain * gain * drift, references=hit[:, None] * at.references), spindle, record, random)
@@ -136,9 +143,20 @@ def campaign(
 
 def faces_struck(spindle: Spindle) -> Array:
     """Two directions (hammers, 2, 3) on the face that each hammer strikes, across each other."""
-    hit = [np.array(spindle.point(node).direction, float) for node in spindle.hammer.hammer_nodes]
-    first = [np.eye(3)[int(np.argmin(np.abs(h)))] for h in hit]
-    return np.array([[a, np.cross(h, a)] for h, a in zip(hit, first, strict=True)])
+    return faces(np.array([spindle.point(node).direction for node in spindle.hammer.hammer_nodes], float))
+
+
+def faces(across: Array) -> Array:
+    """Two directions (points, 2, 3) on the face `across` (points, 3) each point, across each other."""
+    first = [np.eye(3)[int(np.argmin(np.abs(h)))] for h in across]
+    return np.array([[a, np.cross(h, a)] for h, a in zip(across, first, strict=True)])
+
+
+def glued(spindle: Spindle, off: Array, turned: Array) -> tuple[Array, Array]:
+    """Positions and directions (points, 3) of sensors that are `off` (points, 2) in m and `turned` (points, 2) in rad on their faces."""
+    position, direction = points_read(spindle)
+    on = faces(direction)
+    return position + beside(on, off), direction + beside(on, turned)
 
 
 def beside(faces: Array, by: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.blind.alike import left, right, right_names
-from tests.blind.campaigns import HAMMERS_FROM, MASSES_FROM, campaign, further, in_contact, measured
+from tests.blind.campaigns import HAMMERS_FROM, MASSES_FROM, SENSORS_FROM, campaign, further, glued, in_contact, measured
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
@@ -95,6 +95,25 @@ def test_hammers_of_later_worlds_have_gains_of_their_own():
     assert len(further(World(), MASSES_FROM, drawn.spindle).masses) == ways_of_mass(drawn.spindle)
     assert drawn.made().world.motions == World().motions
     assert drawn.made().world.hammer_gain == 0.0
+
+
+def test_sensors_of_later_worlds_are_glued_by_hand():
+    """The same in all tests, each channel by itself; of seeds from before to the last bit where they are drawn. Both are among what may stand in, where a world has them."""
+    drawn, record = draw(948), Record("line", told="noise", times=1e-9)
+    assert further(World(), SENSORS_FROM - 1, drawn.spindle).place == further(World(), SENSORS_FROM - 1, drawn.spindle).askew == 0.0
+    assert min(further(World(), SENSORS_FROM, drawn.spindle).place, further(World(), SENSORS_FROM, drawn.spindle).askew) > 0
+    plain = campaign(drawn.spindle, drawn.tests, (), 948, World(), record)
+    for world in (World(place=4e-4), World(askew=0.02)):
+        made = campaign(drawn.spindle, drawn.tests, (), 948, world, record)
+        for a, b in zip(plain.campaign.tests, made.campaign.tests, strict=True):
+            assert 1e-3 < np.linalg.norm(b.frf.value - a.frf.value) / np.linalg.norm(a.frf.value) < 0.1
+        of = seen(made, drawn.spindle)
+        assert of.columns.shape[1] == seen(plain, drawn.spindle).columns.shape[1] + 4 * len(drawn.spindle.points)
+        off = np.random.default_rng(1).standard_normal((2, len(drawn.spindle.points), 2))
+        sensors = glued(drawn.spindle, world.place * off[0], world.askew * off[1])
+        ways = [[answer(made.built, Condition(p.temperature, p.speed), World(), (), p.place(drawn.spindle), None, s).frf(of.frequency) for p in drawn.tests] for s in (None, sensors)]
+        aside = of.whitened([b - a for a, b in zip(*ways, strict=True)])
+        assert of.beside(aside[:, None]).whole < 0.1 * np.linalg.norm(aside)
 
 
 def test_of_two_that_do_the_same_neither_shows_beside_the_other():

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tests.blind.campaigns import BY_HAND, Made, beside, error_of_hits, faces_struck
+from tests.blind.campaigns import BY_HAND, Made, beside, error_of_hits, faces_struck, glued
 from tests.blind.hidden import Hidden
 from tests.blind.world import World, answer, modal_errors, points_struck
 from thermospindle.model.built.tolerance import toleranced
@@ -27,7 +27,7 @@ INERTIA_SD = 0.1  # relative, of the balls' inertia loads: programs differ in th
 class Seen:
     """What a campaign can tell apart: lines (Hz), standard errors of every test's FRFs there, and the columns (N, k) of all that may stand in for a
     change, each at one standard deviation: build tolerances, temperatures, gains and each mode's constant error, with what couples any two; in worlds that
-    have them thermal motions and hammers' gains."""
+    have them thermal motions, hammers' gains, and where sensors sit and look."""
 
     frequency: Array
     sd: tuple[Array, ...]
@@ -124,6 +124,12 @@ def seen(made: Made, spindle: Spindle, lines: int = 320) -> Seen:
             ]
             columns.append(column([b + max(made.world.miss, BY_HAND) * d for b, d in zip(base, aside, strict=True)]))
             columns += [column([b + made.world.miss_drift * d * (j == k) for j, (b, d) in enumerate(zip(base, aside, strict=True))]) for k in range(len(base))]
+    for way in np.eye(4) if made.world.place or made.world.askew else ():
+        off, turned = (sd * np.tile(by, (len(spindle.points), 1)) for sd, by in ((made.world.place, way[:2]), (made.world.askew, way[2:])))
+        aside = [answer(made.built, Condition(p.temperature, p.speed), plain, (), p.place(spindle), None, glued(spindle, off, turned)).frf(frequency) for p in made.plans]
+        for i in range(len(spindle.points)):
+            pick = (np.arange(len(spindle.points)) == i)[:, None, None]
+            columns.append(column([np.where(pick, moved, b) for moved, b in zip(aside, base, strict=True)]))
     for which, sd in (("motions", MOTIONS_SD), ("masses", MASSES_SD)):
         own = getattr(plain, which)
         for off in np.eye(len(own)) if own != getattr(World(), which) else ():

@@ -49,6 +49,8 @@ class World:
     hammer_drift: float = 0.0  # of it from test to test
     miss: float = 0.0  # m, of each hammer beside its point, on either way, in all tests
     miss_drift: float = 0.0  # m, of it from test to test
+    place: float = 0.0  # m, of each sensor beside its point, on either way, in all tests
+    askew: float = 0.0  # rad, of each sensor out of its direction, alike
     masses: tuple[float, ...] = ()  # by what shares bodies and shafts have their mass otherwise (`distributed`)
 
 
@@ -153,10 +155,16 @@ class Answer:
 
 
 def answer(
-    spindle: Spindle, condition: Condition, world: World, hidden: Sequence[Hidden] = (), place: Place | None = None, hits: Array | None = None
+    spindle: Spindle,
+    condition: Condition,
+    world: World,
+    hidden: Sequence[Hidden] = (),
+    place: Place | None = None,
+    hits: Array | None = None,
+    sensors: tuple[Array, Array] | None = None,
 ) -> Answer:
-    """A spindle at a condition, in a world, with hidden physics; `place` is where their laws are asked, by default the condition, and `hits` (hammers, 3) where hammers are aimed at, by
-    default their points."""
+    """A spindle at a condition, in a world, with hidden physics; `place` is where their laws are asked, by default the condition, `hits` (hammers, 3) where hammers are aimed at, by
+    default their points, and `sensors` where these sit and what way they look (points, 3), by default theirs."""
     if place is None:
         place = condition.temperature, abs(condition.speed) / spindle.nominal_speed
 
@@ -189,7 +197,7 @@ def answer(
         row_of(chain, spindle.point(node).body, at, spindle.point(node).direction)
         for node, at in zip(spindle.hammer.hammer_nodes, changed("hammer", hammers), strict=True)
     ]
-    responses = [row_of(chain, p.body, p.position, p.direction) for p in spindle.points]
+    responses = [row_of(chain, p.body, *own) for p, *own in zip(spindle.points, *(points_read(spindle) if sensors is None else sensors), strict=True)]
     return Answer(linear, np.array(responses), np.array(references), gain, delay, changed("decay", 0.0), state.status)
 
 
@@ -230,6 +238,11 @@ def distributed(chain: RotorBase, spindle: Spindle, shares: Sequence[float]) -> 
 def points_struck(spindle: Spindle) -> Array:
     """Positions (hammers, 3) of the points that hammers strike."""
     return np.array([spindle.point(node).position for node in spindle.hammer.hammer_nodes], float)
+
+
+def points_read(spindle: Spindle) -> tuple[Array, Array]:
+    """Positions and directions (points, 3) of the measuring points."""
+    return np.array([p.position for p in spindle.points], float), np.array([p.direction for p in spindle.points], float)
 
 
 def lowest(spindle: Spindle) -> str:

@@ -162,7 +162,7 @@ def test_what_has_another_law_in_the_data_says_where_to_get_it(add):
     for k, law in enumerate(({"own_law": ["preload_loss"]}, {"departure_from_law": {"preload_loss": 0.3, "added_disk": 0.1}})):
         said = add(f"new{k}", "preload_loss", "added_disk", found=answer() | {"candidates": [pair | law, alone], "where": where})["note"]
         assert said.count("another law than") == 1
-        assert "the data have another law than preload_loss assumes, and loss is its mean over the tests: spindle draft" in said
+        assert "the data have another law than preload_loss assumes, and loss is one for all tests with the law assumed: spindle draft" in said
         assert "--element preload_loss" in said
 
 

@@ -169,9 +169,10 @@ def told_values(c: Candidate, k: int, spindle: Spindle) -> dict[str, dict[str, A
 
 
 def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:
-    """Values with errors of mechanism `k` of an explanation: one size for all tests, its choices and its shape parameters."""
+    """Values with errors of mechanism `k` of an explanation: one size for all tests, its choices and its shape parameters. Beside shapes it is of the sizes at the fitted point, as they are: where the valley
+    between both bends, the mean of the quadratic about that point is no size of these shapes."""
     m, own = h.mechanisms[k], h.evidence
-    size, sd = one_size(m, h.fit.roots[k], own.sizes[k], own.size_covariance[k])
+    size, sd = one_size(m, h.fit.roots[k], h.fit.sizes[k] if m.shape else own.sizes[k], own.size_covariance[k])
     rows: dict[str, dict[str, Any]] = {m.size.name: {"value": size, "sd": sd, "unit": m.size.unit}}
     units = {p.name: p.unit for p in m.effect.parameters}
     rows |= {name: {"value": value, "sd": 0.0, "unit": units[name]} for name, value in m.choices.items()}

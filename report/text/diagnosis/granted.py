@@ -13,7 +13,7 @@ from thermospindle.report.typeset import plain
 
 MOVED, NAMED = 0.5, 3  # standard deviations from which something is said to have moved, and how many of these are named
 PERCENT = (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, kinds_of.GAIN, kinds_of.HAMMER, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.UNEVEN, kinds_of.FLUNG, kinds_of.MASSES)
-UNITS = {kinds_of.TEMPERATURE: (1.0, "K"), kinds_of.MISS: (1e3, "mm")} | dict.fromkeys(PERCENT, (100.0, "%"))
+UNITS = {kinds_of.TEMPERATURE: (1.0, "K"), kinds_of.MISS: (1e3, "mm"), kinds_of.PLACE: (1e3, "mm"), kinds_of.ASKEW: (180 / np.pi, "degrees")} | dict.fromkeys(PERCENT, (100.0, "%"))
 
 
 def granted_words(d: Diagnosis, drawn: float) -> str:

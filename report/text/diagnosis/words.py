@@ -242,13 +242,14 @@ def _values(candidate: dict[str, Any]) -> str:
 
 def spread_words(candidate: dict[str, Any], name: str) -> str:
     """Of the size of an effect whose law the data do not have, by the `name` of its parameter: from which to which it goes over the tests, and its mean last, which says
-    little then; empty of all other parameters."""
+    little then, and nothing where it is of the law assumed and the sizes of one of the data's own; empty of all other parameters."""
     effect = name.split(".", 1)[0]
     first = next(k for k in candidate["parameters"] if k.startswith(f"{effect}."))  # an effect's size comes first
     if name != first or candidate["departure_from_law"].get(effect, 0.0) < DEPARTS:
         return ""
     rows, mean = candidate["law"][effect], candidate["parameters"][name]
-    return _range(rows) + unit_word(mean["unit"], " ") + (f" (mean {plain_error(mean['value'], mean['sd'])})" if len(rows) > 1 else "")
+    told = len(rows) > 1 and effect not in candidate["own_law"]
+    return _range(rows) + unit_word(mean["unit"], " ") + (f" (mean {plain_error(mean['value'], mean['sd'])})" if told else "")
 
 
 def _range(rows: list[dict[str, Any]]) -> str:

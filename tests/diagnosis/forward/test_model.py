@@ -28,7 +28,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     model, x = made(scene, quantity=quantity, window_decay=decay)
     worst = worst_by_kind(model, 1, x)
     assert set(worst) == set(KINDS) - {kinds_of.FLUNG}  # these scenes' balls have none
-    for kind in (kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.MASSES, kinds_of.RECORD):
+    for kind in (kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.PLACE, kinds_of.ASKEW, kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.MASSES, kinds_of.RECORD):
         assert worst[kind] < 1e-4, kind
     for kind in (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.TEMPERATURE):
         assert worst[kind] < 5e-3, kind

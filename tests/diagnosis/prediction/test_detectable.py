@@ -47,11 +47,11 @@ def test_what_is_left_at_the_smallest_size_is_worth_what_is_asked(plain):
 
 
 def test_what_is_nearly_a_tolerance_is_fitted_away(plain):
-    """A sensor on the hub beside the hub's mass, its height and its inertias, each within its tolerance: what is left of it is little, and grows with it. Steps of Gauss and Newton alone led nowhere
+    """A sensor on the hub beside the hub's mass, its height and its inertias, each within its tolerance, and where sensors sit: what is left of it is little, and grows with it. Steps of Gauss and Newton alone led nowhere
     from 65 mg, and left 5000 standard errors."""
     model, done, learned, _ = plain
     sensor = next(m for m in variants(effect("sensor_mass")) if m.choices == {"turning_share": 1.0})
-    assert [visibility(model.thinned, done, learned, sensor, size) for size in (0.0065, 0.065)] == pytest.approx([0.38, 3.8], rel=0.1)
+    assert [visibility(model.thinned, done, learned, sensor, size) for size in (0.0065, 0.065)] == pytest.approx([0.33, 3.2], rel=0.1)
 
 
 @pytest.mark.parametrize(
