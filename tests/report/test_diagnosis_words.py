@@ -87,6 +87,14 @@ def test_the_terminal_tells_drifts_only_where_something_is_missing(told, nothing
     assert "Smallest size these data would have shown" in text
 
 
+@pytest.mark.parametrize(("times", "said"), [(1.0, "none: No effect is missing."), (8.0, "none: No effect is needed, but the drawing is off by more than its tolerances")])
+def test_a_drawing_that_is_far_off_is_no_confirmation(nothing_missing, capsys, times, said):
+    """A table with a mode of the fixture among the spindle's was "No effect is missing", with a hub a fifth lighter than drawn."""
+    answer = diagnosis_json(nothing_missing)
+    show_diagnosis(Console(width=200), answer | {"learned": answer["learned"] | {"build_tolerances_times": times}}, verbose=False)
+    assert capsys.readouterr().out.startswith(said)
+
+
 @pytest.mark.parametrize(
     ("odds", "sentence"),
     [

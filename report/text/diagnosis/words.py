@@ -21,6 +21,7 @@ ODD, AGREE = 5.0, 3.0  # errors by which one test differs from all others, and w
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
 
 
+OFF = "No effect is needed, but the drawing is off by more than its tolerances: where that cannot be so, something else is wrong."
 SENTENCES = {
     "none": "No effect is missing.",
     "identified": "Missing: {}.",
@@ -159,6 +160,8 @@ def _sentence(answer: dict[str, Any]) -> str:
     sure = in_all(effects, [(c["effects"], c["probability"]) for c in answer["candidates"]]) if word == "ambiguous" else ()
     if sure:
         return f"Missing: {' and '.join(sure)}, and perhaps one more: {', '.join(e for e in effects if e not in sure)}."
+    if word == "none" and answer["learned"]["build_tolerances_times"] > 1.0:
+        return OFF
     return SENTENCES[word].format((" and " if word == "two effects" else ", ").join(effects))
 
 
