@@ -132,6 +132,8 @@ def _form_written(mapping: Path, open_: list[str], left: list[str], proposed: li
 
 FAR, FASTER = 100.0, 5.0
 """K beyond the temperatures that a scene is meant for, and times its nominal speed, at which another unit is likelier than such a test."""
+OUTSIDE = 2.0
+"""The factor by which every mode of a table lies beyond the ends of the scene's hammer test where another unit is likelier."""
 
 
 def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
@@ -150,6 +152,11 @@ def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
             found.append(
                 f"test {t.id}: lines from {t.frf.frequency[0]:g} to {t.frf.frequency[-1]:g} Hz, and the hammer test of {spindle.name} is from {first:g} to {last:g} Hz: "
                 "are they in another unit?"
+            )
+        if t.modes and not any(first / OUTSIDE <= m.frequency <= OUTSIDE * last for m in t.modes):
+            found.append(
+                f"test {t.id}: {len(t.modes)} mode{'s' * (len(t.modes) > 1)} from {t.modes[0].frequency:g} to {t.modes[-1].frequency:g} Hz, and the hammer test of {spindle.name} is from "
+                f"{first:g} to {last:g} Hz: are they in another unit?"
             )
     return found or likenesses(spindle, campaign)
 

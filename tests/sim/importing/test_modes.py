@@ -42,6 +42,15 @@ def test_how_sure_dampings_are_may_be_told_for_all_of_them(tmp_path):
     assert "damping_sd_percent" not in (tmp_path / "sure.toml").read_text()
 
 
+@pytest.mark.parametrize(("scale", "doubts"), [(1e-3, 1), (1.0, 0), (1e3, 1)])
+def test_modes_far_from_where_the_scene_is_hit_are_doubted(tmp_path, scale, doubts):
+    """In kHz where Hz are told: FRFs were doubted, tables were not."""
+    (tmp_path / "T20.csv").write_text(f"frequency\n{1002.5 * scale}\n{1545 * scale}\n")
+    (tmp_path / "m.toml").write_text('frequency_sd_Hz = 0.5\n[[tests]]\nid = "T20"\ntemperature_C = 20\nspeed_rpm = 0\n')
+    said = bring([tmp_path / "T20.csv"], mapping=tmp_path / "m.toml", scene=SCENE, out=tmp_path / "c").values["warnings"]
+    assert said == [f"test T20: 2 modes from {1002.5 * scale:g} to {1545 * scale:g} Hz, and the hammer test of hdd_2003 is from 400 to 6000 Hz: are they in another unit?"] * doubts
+
+
 def test_modes_picked_by_hand(tmp_path):
     """The easiest start: a frequency a row, damping in percent, a decimal comma."""
     (tmp_path / "peaks.csv").write_text("test;mode;frequency [Hz];damping %\nT20;1;1002,5;0,5\nT20;2;1545;\n")
