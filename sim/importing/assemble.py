@@ -48,7 +48,7 @@ def read(
     for c in contents:
         own = settings[c.file].test or plain(c.file.stem)
         check_content(c)
-        if c.curves or c.questions or c.motions:
+        if c.curves or c.motions or (c.questions and not c.modes):
             curves.setdefault(own, []).extend(_turned(x, settings[c.file]) for x in c.curves)
         coherence.setdefault(own, []).extend(c.coherence)
         for m in c.modes:

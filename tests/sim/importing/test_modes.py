@@ -60,6 +60,40 @@ def test_modes_picked_by_hand(tmp_path):
     assert [(r.mode, r.frequency, r.frequency_sd, r.damping_ratio) for r in rows] == [(1, 1002.5, 0.5, 0.005), (2, 1545.0, 0.5, None)]
 
 
+def told_by(folder, table, more=""):
+    """The modes of a table, and what was said of it."""
+    (folder / "T20.csv").write_text(table)
+    (folder / "m.toml").write_text(f'frequency_sd_Hz = 0.5\n{more}[[tests]]\nid = "T20"\ntemperature_C = 20\nspeed_rpm = 0\n')
+    notes = bring([folder / "T20.csv"], mapping=folder / "m.toml", scene=SCENE, out=folder / "c").values["notes"]
+    return read_campaign(folder / "c").tests[0].modes, notes
+
+
+def test_columns_that_are_not_known_are_said_to_be_left_out(tmp_path):
+    """A loss factor was dropped without a word."""
+    modes, notes = told_by(tmp_path, "mode,frequency_Hz,loss_factor,Q,\n1,1002.5,0.0108,93,\n2,1545,0.0146,70,\n")
+    assert [m.damping_ratio for m in modes] == [None, None]
+    assert any(n.startswith("T20.csv: columns that are none of a table of modes left out: loss_factor, Q; such columns are test, mode") for n in notes), notes
+
+
+def test_errors_of_dampings_may_be_in_the_same_per_cent(tmp_path):
+    modes, notes = told_by(tmp_path, "mode;frequency_Hz;frequency_sd_Hz;damping_%;damping_sd_%\n1;1002,5;0,2;0,54;0,02\n2;1545;0,4;;\n")
+    assert [(m.frequency_sd, m.damping_ratio, m.damping_ratio_sd) for m in modes] == [(0.2, pytest.approx(0.0054), pytest.approx(0.0002)), (0.4, None, None)]
+    assert notes == []
+
+
+@pytest.mark.parametrize(("unit", "found"), [("percent", [0.0054, 0.0073]), ("ratio", [0.54, 0.73])])
+def test_dampings_of_a_table_that_may_be_in_per_cent_are_asked_about(tmp_path, unit, found):
+    """As those of a UFF file are; the tests that the table names are no other ones for that."""
+    (tmp_path / "T20.csv").write_text(table := "test,mode,frequency_Hz,damping\nT20,1,1002.5,0.54\nT20,2,1545,0.73\n")
+    answer = bring([tmp_path / "T20.csv"], mapping=tmp_path / "form.toml", scene=SCENE)
+    asked = 'T20.csv: damping_unit: whether its dampings are "ratio" or "percent": 0.73, as that of 1545 Hz (line 3) is, would be 73 % or 0.73 %'
+    assert [q for q in answer.values["open"] if "damping" in q] == [asked]
+    assert 'damping_unit = "?"' in (tmp_path / "form.toml").read_text()
+    assert (tmp_path / "form.toml").read_text().count("\n[[tests]]") == 1
+    modes, _ = told_by(tmp_path, table, f'[[files]]\nfile = "T20.csv"\ndamping_unit = "{unit}"\n')
+    assert [m.damping_ratio for m in modes] == pytest.approx(found)
+
+
 def test_shapes_of_a_modal_analysis(tmp_path):
     """Two sets 55: a normal mode in real numbers and an eigenvalue with a complex shape, in all directions of all nodes; the scene's points take what is along
     theirs, and a node that is none of them is passed over."""
