@@ -172,6 +172,14 @@ def test_modes_may_be_told_in_kilohertz(tmp_path, text):
     assert [m.frequency for m in from_modes(tmp_path / "peaks.csv", FileForm(file="x")).modes] == [pytest.approx(1002.5)]
 
 
+@pytest.mark.parametrize(("line", "said"), [("400,1,2", "one line"), ("0,1,2", "no line above 0 Hz")])
+def test_one_line_is_no_frf(tmp_path, line, said):
+    """It was said not to rise from line to line, and one at 0 Hz ended in a traceback."""
+    (tmp_path / "T20.csv").write_text(f"Frequency [Hz],H(1,1) real [m/s/N],H(1,1) imag [m/s/N]\n{line}\n")
+    with pytest.raises(BadInput, match=rf"T20.csv: H\(1,1\) real.*: {said} is no FRF; at least 16 are needed"):
+        imported(tmp_path, "", tmp_path / "T20.csv")
+
+
 def test_lines_may_be_told_in_kilohertz(tmp_path):
     heads, found = columns("real", "(m/s)/N")
     frf = imported(tmp_path, "", table(tmp_path / "T20.csv", ["frequency_kHz", *heads], [FREQUENCY / 1e3, *found]))
