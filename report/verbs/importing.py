@@ -23,7 +23,7 @@ from thermospindle.sim.importing.checks import check_tests
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 from thermospindle.sim.importing.measured import listed
 from thermospindle.sim.importing.places import misfits, shared
-from thermospindle.sim.importing.template import template
+from thermospindle.sim.importing.template import OF_RECORDS, template
 
 
 def bring(
@@ -52,10 +52,12 @@ def bring(
         found = read(files, form, spindle, mapping, done)
         check_tests(found, files)
         if fresh and mapping is not None:
-            with whole(mapping) as file:
-                file.write_text(template(found, files, spindle), encoding="utf-8")
+            _write_form(mapping, template(found, files, spindle))
             filled = read_mapping(mapping)
-            left, proposed = spoken(read(files, filled, spindle, mapping, done), files), _proposed(filled)
+            again = read(files, filled, spindle, mapping, done)
+            if of_records := tuple(q for q in again.questions if q.key in OF_RECORDS):  # what files that the form makes one test do not share
+                _write_form(mapping, template(replace(found, questions=(*found.questions, *of_records)), files, spindle))
+            left, proposed = spoken(again, files), _proposed(filled)
             if out is None:
                 return _form_written(mapping, spoken(found, files), left, proposed)
             if left:
@@ -66,6 +68,11 @@ def bring(
     assert out is not None  # a fresh form has been returned
     write_campaign(campaign, Path(out))
     return _written(campaign, Path(out), notes, None if scene is None else Path(scene), [*renamed, *([] if spindle is None else _doubts(campaign, spindle))])
+
+
+def _write_form(mapping: Path, text: str) -> None:
+    with whole(mapping) as file:
+        file.write_text(text, encoding="utf-8")
 
 
 def _for_scene(form: MappingForm, mapping: Path | None, spindle: Spindle | None, scene: Path | None) -> tuple[MappingForm, list[str]]:

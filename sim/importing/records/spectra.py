@@ -24,7 +24,8 @@ SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
 
 @dataclass(frozen=True, eq=False)
 class FromRecords:
-    """FRFs made of time records, the damping (1/s) of the window left in them, the time (s) from a record's start to the middle of its hit, and what was done and asked."""
+    """FRFs made of time records, the damping (1/s) of the window left in them, the time (s) from a record's start to the middle of its hit, the length (s) of each hit, and what was done
+    and asked."""
 
     curves: tuple[Curve, ...]
     window_decay: float
@@ -32,6 +33,7 @@ class FromRecords:
     notes: tuple[str, ...]
     questions: tuple[Question, ...]
     pretrigger: float = 0.0
+    length: float = 0.0
 
 
 def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm, measured: tuple[float, float] | None = None) -> FromRecords:
@@ -75,7 +77,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     )
     pushed = np.where(pulse[0] > TOUCHING * pulse[0].max(axis=-1, keepdims=True), pulse[0], 0.0)
     middle = step * float((pushed @ (np.arange(float(n)) + 0.5) / pushed.sum(axis=-1)).mean())
-    return FromRecords(curves, decay, len(good), tuple(notes), (), middle)
+    return FromRecords(curves, decay, len(good), tuple(notes), (), middle, n * step)
 
 
 def _apart(files: Sequence[tuple[Path, Sequence[Motion]]], names: str) -> Question | None:

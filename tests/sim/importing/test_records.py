@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -104,6 +106,24 @@ def test_hits_are_found_judged_and_averaged(folder, tmp_path, estimator):
     if estimator == "H1":  # what standard errors say comes true, within the bias of a force cut to its window
         ratio = np.abs(frf.value - model) / frf.sd
         assert 0.4 < np.sqrt(np.mean(ratio**2)) < 3
+
+
+def test_hits_that_are_not_of_one_length_are_asked_about_where_the_form_can_be_answered(folder, tmp_path):
+    """The answer was said to be open in a form that had no line for it; what is proposed is long enough for no hit to be lost, and as long as all of them are."""
+    head, *rows = (folder / "hammer2.csv").read_text().splitlines()
+    n, short = round(RATE * LENGTH), 6500
+    kept = [row for k in range(6) for row in rows[k * n : k * n + short]]
+    (tmp_path / "T20_n0_hammer1.csv").write_text((folder / "hammer1.csv").read_text())
+    (tmp_path / "T20_n0_hammer2.csv").write_text("\n".join([head, *(f"{k / RATE:.9g},{row.partition(',')[2]}" for k, row in enumerate(kept))]) + "\n")
+    files, form = [tmp_path / f"T20_n0_hammer{q}.csv" for q in (1, 2)], tmp_path / "form.toml"
+    bring(files, mapping=form)
+    line = next(row for row in form.read_text().splitlines() if row.startswith('hit_length_s = "?"'))
+    longest = re.search(r"one length for all hits, so that one window fits all its FRFs; at most ([\d.]+), which all of them have", line)[1]
+    assert 0.9 * short / RATE < float(longest) <= short / RATE  # what follows the last hit is shorter than a gap
+    (tmp_path / "m.toml").write_text(MAPPING.replace("hammer*", "*") + form.read_text()[form.read_text().index("[records]") :].replace('"?"', longest))
+    notes = "\n".join(bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"])
+    assert "4 of 6 hits" in notes
+    assert "6 of 6 hits" in notes
 
 
 def test_force_and_response_exchanged_are_said_to_be(folder, tmp_path):
