@@ -117,8 +117,8 @@ def _rectangle(placed: Sequence[Placed]) -> tuple[list[Placed], list[str]]:
 def _common_lines(test: str, placed: Sequence[Placed], band: Sequence[float] | None, notes: list[str]) -> tuple[Array, list[np.ndarray]]:
     """Frequencies (n,) above 0 Hz that all curves have, and which lines of each curve these are."""
     for p in placed:
-        if (lines := len(p.curve.frequency)) < 2:
-            raise BadInput(f"{p.curve.file}: {p.curve.where}: {'one line' if lines else 'no line above 0 Hz'} is no FRF; at least {FEWEST} are needed")
+        if len(p.curve.frequency) < 2:
+            raise BadInput(f"{p.curve.file}: {p.curve.where}: {'one line' if len(p.curve.frequency) else 'no line above 0 Hz'} is no FRF; at least {FEWEST} are needed")
     low = max(p.curve.frequency[0] for p in placed)
     high = min(p.curve.frequency[-1] for p in placed)
     if band is not None:
