@@ -16,7 +16,7 @@ from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.mapping import RecordForm
 from thermospindle.sim.importing.measured import Curve, End, Motion, Question, listed
-from thermospindle.sim.importing.records.hits import TOUCHING, Hit, check_numbers, fault, hits_of
+from thermospindle.sim.importing.records.hits import TOUCHING, Hit, check_numbers, fault, hits_of, limits_of
 from thermospindle.sim.importing.records.windows import contact_time, end_needed, excited, first_heard, shared
 
 SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
@@ -52,7 +52,8 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     step = min(m.step for _, motions in files for m in motions)
     good, hits, notes = _usable(files, step, form)
     if not good:
-        what = f"all {hits} hits are left out ({'; '.join(n.split(': left out, ')[-1] for n in notes[:3])})" if hits else "no hit is found in its force"
+        why = dict.fromkeys(n.split(": left out, ")[-1] for n in notes if ": left out, " in n)
+        what = f"all {hits} hits are left out ({listed(why, 3)})" if hits else "no hit is found in its force"
         return FromRecords((), 0.0, 0, tuple(notes), (Question(every, "records", f"a usable hit: {what}; double_hit_share and overload set what is refused"),))
     if against := sum(h.sense < 0 for h in good):
         to = reference.label if reference.direction else "its point"
@@ -102,8 +103,9 @@ def _usable(files: Sequence[tuple[Path, Sequence[Motion]]], step: float, form: R
         own, said = hits_of(path, motions, step, form)
         hits += len(own)
         notes += said
+        limits = limits_of(own)
         for hit in own:
-            if (wrong := fault(hit, ends, step, form)) is None:
+            if (wrong := fault(hit, ends, step, form, limits)) is None:
                 good.append(hit)
             else:
                 left_out.append(f"{hit.where}: left out, {wrong}")
