@@ -11,7 +11,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import TestData, mode_data
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
-from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
+from thermospindle.diagnosis.forward.making import campaign_model, check_tables, expected_noise
 from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, CampaignModel
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, Hypothesis
@@ -139,11 +139,13 @@ def unable(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> dict[str, s
 
 
 def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> CampaignModel:
-    """The model of a campaign beside the data of all its tests; BadInput for points on bodies that the scene has not."""
+    """The model of a campaign beside the data of all its tests; BadInput for points on bodies that the scene has not, and for tables of more modes than it may have there."""
     check_points(spindle, campaign)
     noise = expected_noise(spindle)
     data = in_parallel(partial(_data, campaign.noise, noise, spindle.tolerances.gain), campaign.tests, done=lambda d: progress(f"{d.test.id} read"))
-    return campaign_model(spindle, campaign, data)
+    model = campaign_model(spindle, campaign, data)
+    check_tables(model, str(campaign.folder or campaign.title))
+    return model
 
 
 def _data(stated: Noise | None, expected: Noise, gain: float, test: Test) -> TestData:

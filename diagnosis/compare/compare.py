@@ -25,6 +25,9 @@ from thermospindle.sim.campaign.beside import beside, check_points, measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.effects import of_scene
 
+GONE = 5.0
+"""Standard errors that a missing mode counts as at least: whether it is there at all does not hang on how sure its frequency is."""
+
 
 @dataclass(frozen=True)
 class PairedMode:
@@ -114,7 +117,7 @@ class Comparison:
     """A campaign beside a scene; `comac` by node, None where no mode moves it; `crossings` in words.
 
     `rms_residual` is over frequencies and dampings, correlations of their errors included. A missing mode counts as an error of
-    `BELIEVABLE`, so that a model does not look better for losing a mode.
+    `BELIEVABLE`, and of `GONE` standard errors at least, so that a model does not look better for losing a mode.
     """
 
     spindle: str
@@ -265,7 +268,7 @@ def _test(
     error = np.log(computed / np.concatenate([o.frequency, o.damping])[rows])
     covariance = (o.covariance + np.diag(np.where(np.isfinite(relative), extra, 0.0)))[np.ix_(rows, rows)]
     residuals = np.zeros(2 * m)
-    residuals[rows], residuals[lost] = whitened(error, covariance), BELIEVABLE / relative[lost]
+    residuals[rows], residuals[lost] = whitened(error, covariance), np.maximum(BELIEVABLE / relative[lost], GONE)
     offsets: dict[tuple[int, int], Array] = {}
     for i, column in zip(rows.tolist(), whitened(np.eye(len(rows)), covariance).reshape(len(rows), len(rows)).T, strict=True):
         offset = offsets.setdefault((number[int(partner[i % m])], i // m), np.zeros(2 * m))

@@ -8,11 +8,13 @@ from functools import cache
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.data.mode_table import TestData
+from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
+from thermospindle.diagnosis.forward.table import Table
 from thermospindle.diagnosis.parameters.nuisance import RANGE_K, Nuisance, changes_of, nuisances
 from thermospindle.diagnosis.parameters.reference import reference_modes
 from thermospindle.model.built.tolerance import toleranced
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.sim.campaign.beside import measured_at
@@ -38,6 +40,19 @@ def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestDat
     names = [d.test.id for d in tests]
     parameters = nuisances(spindle, build, names, bool(lines), channels, hammers, modes, changes(spindle, present, names, [d.condition for d in tests]))
     return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present, lumped=campaign.lumped_shafts)
+
+
+def check_tables(model: CampaignModel, where: str) -> None:
+    """`BadInput` for a table with more modes than the spindle as drawn has where they may be; `where` names the campaign."""
+    for t, data in enumerate(model.tests):
+        if not isinstance(data, ModeData):
+            continue
+        try:
+            linear = model.linear(t, np.zeros(len(model.parameters)), [])
+        except FAILED:
+            continue
+        if few := Table(linear, data).too_few():
+            raise BadInput(f"{where}: tests.{data.test.id}: {few}")
 
 
 def changes(spindle: Spindle, present: Applied, names: Sequence[str], conditions: Sequence[Condition]) -> list[Nuisance]:

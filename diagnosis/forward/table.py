@@ -9,12 +9,14 @@ import numpy as np
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward.linear import Linear, Products, shown
 from thermospindle.diagnosis.forward.shapes import ShapeBeside
+from thermospindle.model.errors import listed
 from thermospindle.model.rotor.modes import Poles, kinds, oscillating, poles_below, stiffest_of, with_mass_between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import MIXING, ModeSet
 
 REACH = 2.5  # times the highest measured frequency, up to which modes of the model may be those of a table
+LOWEST, MANY = 3, 8  # modes of the model at least, and of the table at most, that are named where it has too few
 
 
 class Table:
@@ -22,6 +24,18 @@ class Table:
 
     def __init__(self, linear: Linear, data: ModeData) -> None:
         self._linear, self._data = linear, data
+
+    def too_few(self) -> str:
+        """Why the modes of the model cannot be those of the table, in words; else empty."""
+        measured, n = self._data.frequency, len(self._data.frequency)
+        below = len(poles_below(self._linear.matrices, self._reach, self._linear.between)[0])
+        if below >= n:
+            return ""
+        lowest = np.abs(poles_below(self._linear.matrices, np.inf, self._linear.between)[0][: max(n, LOWEST)]) / (2 * np.pi)
+        return (
+            f"{n} mode{'s' * (n > 1)} measured at {listed([f'{f:.5g}' for f in measured[:MANY]])}{' and more' * (n > MANY)} Hz, and the model has {below or 'none'} below {self._reach:.5g} Hz, {REACH:g} times "
+            f"the highest of them; its lowest are at {listed([f'{f:.5g}' for f in lowest])} Hz: are frequencies in another unit, or of another machine?"
+        )
 
     @cached_property
     def residual(self) -> Array:

@@ -110,6 +110,10 @@ def verdict(c: Comparison) -> str:
         if off > max(alone, ALMOST):
             return f"{sentence}; no frequency alone is off by more than {alone:.1f}, but dampings are, most that of {_mode(t, m)} by {off:.3g}."
         return f"{sentence}; {TOGETHER.format(alone)}."
+    if not every:
+        none = sum(len(t.missing) for t in c.tests)
+        of = f"none of the {none} measured modes has" if none > 1 else "the one measured mode has no"
+        return f"{sentence}; {of} {'a ' * (none > 1)}computed partner within {BELIEVABLE:.0%} of its frequency: are frequencies in another unit, or of another machine?"
     if lost := [f"{f:.5g} Hz of {t.test.id}" for t in c.tests for f in t.missing]:
         several = len(lost) > 1
         sentence += f"; no computed mode is within {BELIEVABLE:.0%} of the measured one{'s' * several} at {_first(lost)}, which count{'' if several else 's'} as that much"

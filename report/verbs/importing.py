@@ -23,7 +23,7 @@ from thermospindle.sim.importing.checks import check_tests
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 from thermospindle.sim.importing.measured import listed
 from thermospindle.sim.importing.places import misfits, shared
-from thermospindle.sim.importing.template import template
+from thermospindle.sim.importing.template import OF_RECORDS, template
 
 
 def bring(
@@ -52,10 +52,12 @@ def bring(
         found = read(files, form, spindle, mapping, done)
         check_tests(found, files)
         if fresh and mapping is not None:
-            with whole(mapping) as file:
-                file.write_text(template(found, files, spindle), encoding="utf-8")
+            _write_form(mapping, template(found, files, spindle))
             filled = read_mapping(mapping)
-            left, proposed = spoken(read(files, filled, spindle, mapping, done), files), _proposed(filled)
+            again = read(files, filled, spindle, mapping, done)
+            if of_records := tuple(q for q in again.questions if q.key in OF_RECORDS):  # what files that the form makes one test do not share
+                _write_form(mapping, template(replace(found, questions=(*found.questions, *of_records)), files, spindle))
+            left, proposed = spoken(again, files), _proposed(filled)
             if out is None:
                 return _form_written(mapping, spoken(found, files), left, proposed)
             if left:
@@ -66,6 +68,11 @@ def bring(
     assert out is not None  # a fresh form has been returned
     write_campaign(campaign, Path(out))
     return _written(campaign, Path(out), notes, None if scene is None else Path(scene), [*renamed, *([] if spindle is None else _doubts(campaign, spindle))])
+
+
+def _write_form(mapping: Path, text: str) -> None:
+    with whole(mapping) as file:
+        file.write_text(text, encoding="utf-8")
 
 
 def _for_scene(form: MappingForm, mapping: Path | None, spindle: Spindle | None, scene: Path | None) -> tuple[MappingForm, list[str]]:
@@ -132,6 +139,8 @@ def _form_written(mapping: Path, open_: list[str], left: list[str], proposed: li
 
 FAR, FASTER = 100.0, 5.0
 """K beyond the temperatures that a scene is meant for, and times its nominal speed, at which another unit is likelier than such a test."""
+OUTSIDE = 2.0
+"""The factor by which every mode of a table lies beyond the ends of the scene's hammer test where another unit is likelier."""
 
 
 def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
@@ -150,6 +159,11 @@ def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
             found.append(
                 f"test {t.id}: lines from {t.frf.frequency[0]:g} to {t.frf.frequency[-1]:g} Hz, and the hammer test of {spindle.name} is from {first:g} to {last:g} Hz: "
                 "are they in another unit?"
+            )
+        if t.modes and not any(first / OUTSIDE <= m.frequency <= OUTSIDE * last for m in t.modes):
+            found.append(
+                f"test {t.id}: {len(t.modes)} mode{'s' * (len(t.modes) > 1)} from {t.modes[0].frequency:g} to {t.modes[-1].frequency:g} Hz, and the hammer test of {spindle.name} is from "
+                f"{first:g} to {last:g} Hz: are they in another unit?"
             )
     return found or likenesses(spindle, campaign)
 

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.units import MINUTE, RPM
@@ -23,6 +25,8 @@ from thermospindle.sim.importing.names import plain
 from thermospindle.sim.importing.places import place, points_of, unplaced
 from thermospindle.sim.importing.records.grouped import grouped
 from thermospindle.sim.importing.records.spectra import frfs_of, open_channels
+
+SHORT = 1e-4  # s, to which the length that all hits have is told
 
 
 def read(
@@ -48,7 +52,7 @@ def read(
     for c in contents:
         own = settings[c.file].test or plain(c.file.stem)
         check_content(c)
-        if c.curves or c.questions or c.motions:
+        if c.curves or c.motions or (c.questions and not c.modes):
             curves.setdefault(own, []).extend(_turned(x, settings[c.file]) for x in c.curves)
         coherence.setdefault(own, []).extend(c.coherence)
         for m in c.modes:
@@ -63,6 +67,8 @@ def read(
     measured = scene.hammer.band if scene is not None and form.band_Hz is None and form.records.band_Hz is None else None
     if groups and scene is not None and measured:
         notes.append(f"time records: kept from {measured[0]:g} to {measured[1]:g} Hz, where the hammer test of {scene.name} is; band_Hz under [records] keeps another band")
+    lengths: list[float] = []
+    uneven: list[str] = []  # tests whose hits are not of one length
     for (test, label), group in groups.items():
         made = frfs_of(group, label, form.records, measured)
         notes += made.notes
@@ -70,8 +76,11 @@ def read(
         curves.setdefault(test, []).extend(made.curves)
         if made.curves:
             pretrigger[test] = made.pretrigger
+            lengths.append(made.length)
         if made.window_decay > 0 and abs(window.setdefault(test, made.window_decay) / made.window_decay - 1) > 1e-9:
-            questions.append(Question(f"test {test}", "hit_length_s", "one length for all hits, so that one window fits all its FRFs"))
+            uneven.append(test)
+    longest = np.floor(min(lengths, default=0.0) / SHORT) * SHORT
+    questions += [Question(f"test {t}", "hit_length_s", f"one length for all hits, so that one window fits all its FRFs; at most {longest:g}, which all of them have") for t in dict.fromkeys(uneven)]
     questions += open_parts(curves)
     own_curves = [(x.file.name, x) for every in curves.values() for x in every if not x.magnitude_only]
     told = _ends(own_curves, contents)

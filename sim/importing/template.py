@@ -32,6 +32,10 @@ MORE = """\
 """
 
 
+OF_RECORDS = ("hit_length_s",)
+"""Keys under [records] that may be asked."""
+
+
 def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
     """The text of a mapping for these files."""
     lines = [HEAD, f"{KEY} = {CURRENT[MAPPING]}", f'title = {toml(f"imported from {listed((f.name for f in files), 3)}")}']
@@ -59,6 +63,8 @@ def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
     for test in names:
         lines += ["", "[[tests]]", f"id = {toml(test)}", *_condition(test, shared, _examples(scene))]
     lines += [line for block in _points(found, scene) for line in block]
+    if of_records := {q.key: q.text for q in found.questions if q.key in OF_RECORDS}:
+        lines += ["", "[records]", *(f"{key} = {toml('?')}    # {text}" for key, text in of_records.items())]
     return "\n".join([*lines, "", MORE])
 
 

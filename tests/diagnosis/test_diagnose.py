@@ -13,6 +13,7 @@ from tests.virtual_campaign import drawn, mode_campaign, model_of, virtual_campa
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import diagnose, unable
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.material import Law
 from thermospindle.model.scene.reading import load
@@ -37,6 +38,16 @@ def tables(spindle, effects, highest=2600.0, seed=1):
             rows.append(ModeRow(f"T{t:g}", i, m.kind, f, 5e-5 * m.frequency, z, 0.01 * m.damping_ratio))
         tests.append(Test(f"T{t:g}", t, 0.0, modes=tuple(rows)))
     return Campaign("made", spindle.name, "mobility", spindle.points, tuple(tests))
+
+
+@pytest.mark.parametrize("frequencies", [(1.0025, 1.545), (400.0, 450.0, 500.0)])
+def test_a_table_of_more_modes_than_the_spindle_may_have_there_is_refused(spindle, frequencies):
+    """In kHz where Hz are told, or of another machine: it ended in a traceback."""
+    rows = tuple(ModeRow("cold", k, "unknown", f, 0.3) for k, f in enumerate(frequencies, 1))
+    campaign = Campaign("lab", spindle.name, "mobility", (), (Test("cold", 20.0, 0.0, modes=rows),))
+    below = f"{'none' if len(frequencies) == 2 else 1} below {2.5 * frequencies[-1]:.5g} Hz"
+    with pytest.raises(BadInput, match=f"lab: tests.cold: {len(frequencies)} modes measured at {frequencies[0]:.5g}.* and the model has {below}.*; its lowest are at 1002, 1545 and 1795 Hz"):
+        diagnose(spindle, campaign)
 
 
 def test_an_effect_that_cannot_be_worked_out_is_told(spindle):

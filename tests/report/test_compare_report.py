@@ -260,6 +260,17 @@ def test_a_table_of_modes_has_no_frfs_to_show(spindle, tmp_path):
     assert "1300.0 Hz" in (tmp_path / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
 
 
+@pytest.mark.parametrize(("frequencies", "said"), [((1.0025, 1.545), "none of the 2 measured modes has a computed partner"), ((1.545,), "the one measured mode has no computed partner")])
+def test_no_scene_agrees_with_modes_of_which_none_is_paired(spindle, frequencies, said):
+    """In kHz, to 0.3 Hz: each counted as 8 % of its frequency, a quarter of its standard error, and the scene was said to agree."""
+    rows = tuple(ModeRow("t", k, "axial", f, 0.3) for k, f in enumerate(frequencies, 1))
+    found = compare(spindle, Campaign("table", spindle.name, "mobility", spindle.points, (Test("t", 20.0, 0.0, modes=rows),)))
+    assert found.tests[0].modes == ()
+    told = verdict(found)
+    assert "does not agree with the tests" in told
+    assert f"{said} within 8% of its frequency: are frequencies in another unit" in told
+
+
 def test_a_test_without_modes_is_shown(spindle, campaign):
     """Nothing found in the FRFs: they are still compared, and the pictures drawn."""
     empty = observe(Campaign("n", spindle.name, "mobility", (), (replace(campaign.tests[0], frf=None),)), spindle)[0]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.cells import plain_number
 from thermospindle.model.scene.fields import LARGEST
 from thermospindle.sim.importing.files.text import COMMENT, text_of
+from thermospindle.sim.importing.files.uff_modes import HEAVY, heavy
+from thermospindle.sim.importing.mapping import FileForm
 from thermospindle.sim.importing.measured import Content, ModeLine
 
 COLUMNS = {
@@ -19,10 +22,12 @@ COLUMNS = {
     "freq_hz": "frequency", "hz": "frequency", "frequenz": "frequency", "frequenz_hz": "frequency", "eigenfrequenz": "frequency", "eigenfrequenz_hz": "frequency",
     "frequency_khz": "kilohertz", "f_khz": "kilohertz", "freq_khz": "kilohertz", "natural_frequency_khz": "kilohertz", "khz": "kilohertz",
     "frequency_sd_hz": "sd", "frequency_sd": "sd", "sd": "sd", "sd_hz": "sd", "damping_ratio": "damping", "damping": "damping", "zeta": "damping",
-    "damping_ratio_sd": "damping_sd", "damping_%": "percent", "damping_percent": "percent", "zeta_%": "percent",
+    "damping_ratio_sd": "damping_sd", "damping_sd_%": "percent_sd", "damping_%_sd": "percent_sd", "damping_%": "percent", "damping_percent": "percent", "zeta_%": "percent",
 }  # fmt: skip
 """Headings in small letters, with blanks, points and brackets as _: what they are."""
 FREQUENCIES = {"frequency", "kilohertz"}
+WORDS = {"test", "mode", "kind"}
+KNOWN = "such columns are test, mode, kind, frequency_Hz or frequency_kHz, frequency_sd_Hz, damping_ratio, damping_ratio_sd, damping_%, damping_sd_%"
 KINDS = ("axial", "rocking", "lateral", "unknown")
 """What modes are paired by."""
 
@@ -67,14 +72,19 @@ def _is_number(lines: list[str]) -> bool:
     return re.fullmatch(r"[-+\d.eE]+", first) is not None
 
 
-def from_modes(file: Path) -> Content:
-    """The modes of a table. Raises `BadInput` naming the line for what is no number, or no possible one."""
+def from_modes(file: Path, settings: FileForm) -> Content:
+    """The modes of a table, whether its dampings are in per cent where that is open, and which of its columns are left out. Raises `BadInput` naming the line for what is no number, or no
+    possible one."""
     found = headings(file)
     assert found is not None
     named, separator, first = found
+    written = [cell.strip().strip('"') for cell in COMMENT.sub("", text_of(file).splitlines()[first]).split(separator)]
+    called = dict(zip(named, written, strict=True))
     if "kilohertz" in named and {"frequency", "sd"} & {*named}:
         raise BadInput(f"{file}: line {first + 1}: has frequencies in kHz and another column of them, or of their errors, in Hz; write all in Hz")
-    modes = []
+    modes: list[ModeLine] = []
+    lines: dict[tuple[str, str], int] = {}  # by test and mode
+    ratios: list[tuple[float, float, str]] = []  # dampings that are told without per cent, their frequencies and where they stand
     try:
         rows = list(csv.reader(text_of(file).splitlines(), delimiter=separator))
     except csv.Error as error:
@@ -86,33 +96,49 @@ def from_modes(file: Path) -> Content:
         if len(cells) > len(named):
             raise BadInput(f"{where}: has {len(cells)} cells, the headings are {len(named)}")
         told = {name: cell.strip() for name, cell in zip(named, cells, strict=False) if name and cell.strip()}
-        frequency = _number(where, told, "frequency", separator)
-        if (kilohertz := _number(where, told, "kilohertz", separator)) is not None:
-            frequency = 1e3 * kilohertz
+        value = {key: _number(where, told[key], key, called[key], separator) for key in told if key not in WORDS}
+        frequency = 1e3 * value["kilohertz"] if "kilohertz" in value else value.get("frequency")
         if frequency is None:
             raise BadInput(f"{where}: frequency = '': a positive number is needed, in Hz, or in kHz under the heading frequency_kHz")
-        damping = _number(where, told, "damping", separator)
-        if (percent := _number(where, told, "percent", separator)) is not None:
-            damping = percent / 100
-        if damping is not None and not 0 < damping < 1:
-            raise BadInput(f"{where}: damping = {damping:g}: a ratio above 0 and below 1 is allowed; in percent under the heading damping_%")
-        sd, damping_sd = (_number(where, told, key, separator) for key in ("sd", "damping_sd"))
+        own = told.get("test", ""), told.get("mode", f"line {number}")
+        if (before := lines.setdefault(own, number)) < number:
+            raise BadInput(f"{where}: {called['mode']} = {own[1]!r}: stands in line {before + 1} already{f', of test {own[0]}' if own[0] else ''}; each mode of a test may stand once")
+        damping, sd = _damping(where, value, called, settings)
+        if damping is not None and "percent" not in value:
+            ratios.append((damping, frequency, f"line {number + 1}"))
         kind = told.get("kind", "unknown").lower()
         if kind not in KINDS:
             raise BadInput(f"{where}: kind = {told['kind']!r}: allowed are {', '.join(KINDS)}, or nothing")
-        modes.append(ModeLine(told.get("test", ""), kind, frequency, sd, damping, damping_sd if damping else None))
+        modes.append(ModeLine(told.get("test", ""), kind, frequency, value.get("sd"), damping, sd))
     if not modes:
         raise BadInput(f"{file}: has headings of a table of modes and no mode below them")
-    return Content(file, modes=tuple(modes))
+    largest = max(ratios, default=(0.0, 0.0, ""))
+    questions = (heavy(file, *largest),) if settings.damping_unit is None and largest[0] >= HEAVY else ()
+    left_out = [name for key, name in zip(named, written, strict=True) if name and not key]
+    notes = (f"{file.name}: columns that are none of a table of modes left out: {', '.join(left_out)}; {KNOWN}",) if left_out else ()
+    return Content(file, modes=tuple(modes), questions=questions, notes=notes)
 
 
-def _number(where: str, told: dict[str, str], key: str, separator: str) -> float | None:
-    if key not in told:
-        return None
+def _damping(where: str, value: Mapping[str, float], called: Mapping[str, str], settings: FileForm) -> tuple[float | None, float | None]:
+    """The damping ratio of a mode and its standard error, None where they are not told; per cent are told by the heading, or by the mapping."""
+    percent = "percent" in value or settings.damping_unit == "percent"
+    key = "percent" if "percent" in value else "damping"
+    if key not in value:
+        return None, None
+    unit = 0.01 if percent else 1.0
+    if not unit * value[key] < 1:
+        allowed = "below 100 per cent is allowed" if percent else 'a ratio above 0 and below 1 is allowed; in percent under the heading damping_%, or with damping_unit = "percent" in its [[files]]'
+        raise BadInput(f"{where}: {called[key]} = {value[key]:g}: {allowed}")
+    if "percent_sd" in value:
+        return unit * value[key], 0.01 * value["percent_sd"]
+    return unit * value[key], value["damping_sd"] * (unit if key == "damping" else 1.0) if "damping_sd" in value else None
+
+
+def _number(where: str, text: str, key: str, called: str, separator: str) -> float:
     try:
-        value = float(plain_number(told[key].replace(",", ".") if separator != "," else told[key]))
+        value = float(plain_number(text.replace(",", ".") if separator != "," else text))
     except ValueError:
-        raise BadInput(f"{where}: {key} = {told[key]!r}: is no number") from None
+        raise BadInput(f"{where}: {called} = {text!r}: is no number") from None
     if not 0 < value <= LARGEST:
-        raise BadInput(f"{where}: {key} = {told[key]!r}: a positive number{' in Hz' * (key in ('frequency', 'sd'))} is needed")
+        raise BadInput(f"{where}: {called} = {text!r}: a positive number{' in Hz' * (key in ('frequency', 'sd'))} is needed")
     return value

@@ -28,7 +28,7 @@ def content(file: Path, settings: FileForm) -> Content:
     if file.suffix.lower() in UFF or _begins_as_uff(file):
         return from_uff(file, settings)
     if headings(file) is not None:
-        return from_modes(file)
+        return from_modes(file, settings)
     try:
         return from_table(read_table(file), settings)
     except BadInput:

@@ -56,8 +56,7 @@ def modes_of(file: Path, found: Sequence[Found], settings: FileForm) -> tuple[tu
     open_ = settings.damping_unit is None and largest is not None and (largest.told or 0.0) >= HEAVY
     questions = []
     if largest is not None and open_:
-        of = f"{largest.told:g}, as that of {largest.line.frequency:g} Hz ({largest.where}) is, would be {100 * (largest.told or 0.0):g} % or {largest.told:g} %"
-        questions.append(Question(file.name, "damping_unit", f'whether its dampings are "ratio" or "percent": {of}'))
+        questions.append(heavy(file, largest.told or 0.0, largest.line.frequency, largest.where))
     lines, without = [], []
     for f in found:
         ratio = f.line.damping_ratio if f.told is None else f.told / (100 if settings.damping_unit == "percent" else 1)
@@ -71,6 +70,12 @@ def modes_of(file: Path, found: Sequence[Found], settings: FileForm) -> tuple[tu
     if second := [f"{f.line.frequency:g}" for f in found if f.second]:
         notes.append(f"{file.name}: hysteretic damping beside another viscous one left out, of the modes of {', '.join(second)} Hz")
     return tuple(lines), questions, notes
+
+
+def heavy(file: Path, damping: float, frequency: float, where: str) -> Question:
+    """What is asked of a file whose largest damping is that of one mode, of `HEAVY` or more."""
+    of = f"{damping:g}, as that of {frequency:g} Hz ({where}) is, would be {100 * damping:g} % or {damping:g} %"
+    return Question(file.name, "damping_unit", f'whether its dampings are "ratio" or "percent": {of}')
 
 
 def _shape(record: Mapping[str, Any]) -> tuple[tuple[End, complex], ...]:

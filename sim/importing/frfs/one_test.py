@@ -116,6 +116,9 @@ def _rectangle(placed: Sequence[Placed]) -> tuple[list[Placed], list[str]]:
 
 def _common_lines(test: str, placed: Sequence[Placed], band: Sequence[float] | None, notes: list[str]) -> tuple[Array, list[np.ndarray]]:
     """Frequencies (n,) above 0 Hz that all curves have, and which lines of each curve these are."""
+    for p in placed:
+        if len(p.curve.frequency) < 2:
+            raise BadInput(f"{p.curve.file}: {p.curve.where}: {'one line' if len(p.curve.frequency) else 'no line above 0 Hz'} is no FRF; at least {FEWEST} are needed")
     low = max(p.curve.frequency[0] for p in placed)
     high = min(p.curve.frequency[-1] for p in placed)
     if band is not None:
@@ -125,7 +128,7 @@ def _common_lines(test: str, placed: Sequence[Placed], band: Sequence[float] | N
     columns = []
     for p in placed:
         own = p.curve.frequency
-        if len(own) < 2 or not np.all(np.diff(own) > 0):
+        if not np.all(np.diff(own) > 0):
             raise BadInput(f"{p.curve.file}: {p.curve.where}: its frequencies do not rise from line to line, as FRFs of a campaign must")
         if not even(own) and (at := gap(own)) is not None:
             raise BadInput(f"{p.curve.file}: {p.curve.where}: from {own[at]:g} to {own[at + 1]:g} Hz among steps of {np.median(np.diff(own)):g} Hz; no line may be missing")

@@ -1,7 +1,7 @@
 """Hits of a hammer: found in the records of its force, taken out of them without what their sensors held before, and judged.
 
-A hit cannot be used where a channel was overloaded (its extreme reached three times exactly, or beyond what the mapping says) or where the hammer struck twice, and is none where the record ends
-before it does.
+A hit cannot be used where a channel was overloaded (its extreme reached three times exactly, by it or by another hit of its record, or beyond what the mapping says) or where the hammer struck
+twice, and is none where the record ends before it does.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ HELD = 3  # samples at exactly the extreme that tell an overload
 BEFORE = 5  # times the lead of a hit, over which its channels' offsets are averaged
 FEWEST = 8  # samples before a hit that tell an offset
 TOLD = 0.01  # of a channel's largest value, from which an offset is worth a note
+SAME = 5e-5  # of the limit that one hit tells, within which another has reached it: two steps of 16 bits, for the lower end of their range is one further off than the upper
 STEPS = 200  # of quantisation within an extreme, below which held samples tell nothing
 
 
@@ -114,16 +115,37 @@ def _starts(force: Array, strongest: float, apart: int) -> list[int]:
     return starts
 
 
-def fault(hit: Hit, ends: Sequence[End], step: float, form: RecordForm) -> str | None:
-    """Why a hit cannot be used; None where it can."""
+@dataclass(frozen=True)
+class Limit:
+    """The `size` at which a channel stands `held` times in the hit `where`, and beyond which no hit of its record goes."""
+
+    size: float
+    held: int
+    where: str
+
+
+def limits_of(hits: Sequence[Hit]) -> list[Limit | None]:
+    """The limits that the hits of one record tell, of the force and of every response; None of a channel that none of them overloads."""
+    found: list[Limit | None] = []
+    for by_hit in zip(*([h.force, *h.recorded] for h in hits), strict=True):
+        told = [Limit(abs(held[0]), held[1], h.where) for h, value in zip(hits, by_hit, strict=True) if (held := _held(value))]
+        largest = max(float(np.abs(value).max()) for value in by_hit)
+        found.append(next((limit for limit in told if largest <= limit.size * (1 + SAME)), None))
+    return found
+
+
+def fault(hit: Hit, ends: Sequence[End], step: float, form: RecordForm, limits: Sequence[Limit | None]) -> str | None:
+    """Why a hit cannot be used, `limits` being those of its record; None where it can."""
     channels = [("force", hit.force), *((e.label or "response", r) for e, r in zip(ends, hit.recorded, strict=True))]
-    for name, value in channels:
-        limit = form.overload.get(name)
+    for (name, value), of_record in zip(channels, limits, strict=True):
+        limit, largest = form.overload.get(name), float(np.abs(value).max())
         called = f"response {name}" if name.isdigit() else name
-        if limit is not None and np.abs(value).max() >= limit:
-            return f"overload: {called} reaches {np.abs(value).max():.4g}, limit {limit:g}"
+        if limit is not None and largest >= limit:
+            return f"overload: {called} reaches {largest:.4g}, limit {limit:g}"
         if held := _held(value):
-            return f"overload: {called} reaches {value[np.argmax(np.abs(value))]:.4g} and never more, {held} times"
+            return f"overload: {called} reaches {held[0]:.4g} and never more, {held[1]} times"
+        if of_record is not None and largest >= of_record.size * (1 - SAME):
+            return f"overload: {called} reaches {value[np.argmax(np.abs(value))]:.4g}, the limit at which {of_record.where.rpartition(': ')[-1]} stands {of_record.held} times"
     peak = int(np.argmax(hit.force[: round((PRE_TRIGGER + form.apart_s) / step)]))
     after = hit.force[peak:]
     released = np.flatnonzero(after < TOUCHING * hit.force[peak])
@@ -136,8 +158,8 @@ def fault(hit: Hit, ends: Sequence[End], step: float, form: RecordForm) -> str |
     return None
 
 
-def _held(value: Array) -> int:
-    """How often a channel stands exactly at an extreme where that tells an overload, else 0."""
+def _held(value: Array) -> tuple[float, int] | None:
+    """The extreme at which a channel stands exactly, and how often, where that tells an overload."""
     steps = np.abs(np.diff(value))
     smallest = steps[steps > 0].min(initial=np.inf)
     for extreme in (value.max(), value.min()):
@@ -145,5 +167,5 @@ def _held(value: Array) -> int:
             continue
         held = int(np.count_nonzero(value == extreme))
         if held >= HELD:
-            return held
-    return 0
+            return float(extreme), held
+    return None

@@ -16,7 +16,7 @@ from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.mapping import RecordForm
 from thermospindle.sim.importing.measured import Curve, End, Motion, Question, listed
-from thermospindle.sim.importing.records.hits import TOUCHING, Hit, check_numbers, fault, hits_of
+from thermospindle.sim.importing.records.hits import TOUCHING, Hit, check_numbers, fault, hits_of, limits_of
 from thermospindle.sim.importing.records.windows import contact_time, end_needed, excited, first_heard, shared
 
 SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
@@ -24,7 +24,8 @@ SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
 
 @dataclass(frozen=True, eq=False)
 class FromRecords:
-    """FRFs made of time records, the damping (1/s) of the window left in them, the time (s) from a record's start to the middle of its hit, and what was done and asked."""
+    """FRFs made of time records, the damping (1/s) of the window left in them, the time (s) from a record's start to the middle of its hit, the length (s) of each hit, and what was done
+    and asked."""
 
     curves: tuple[Curve, ...]
     window_decay: float
@@ -32,6 +33,7 @@ class FromRecords:
     notes: tuple[str, ...]
     questions: tuple[Question, ...]
     pretrigger: float = 0.0
+    length: float = 0.0
 
 
 def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm, measured: tuple[float, float] | None = None) -> FromRecords:
@@ -50,7 +52,8 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     step = min(m.step for _, motions in files for m in motions)
     good, hits, notes = _usable(files, step, form)
     if not good:
-        what = f"all {hits} hits are left out ({'; '.join(n.split(': left out, ')[-1] for n in notes[:3])})" if hits else "no hit is found in its force"
+        why = dict.fromkeys(n.split(": left out, ")[-1] for n in notes if ": left out, " in n)
+        what = f"all {hits} hits are left out ({listed(why, 3)})" if hits else "no hit is found in its force"
         return FromRecords((), 0.0, 0, tuple(notes), (Question(every, "records", f"a usable hit: {what}; double_hit_share and overload set what is refused"),))
     if against := sum(h.sense < 0 for h in good):
         to = reference.label if reference.direction else "its point"
@@ -75,7 +78,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     )
     pushed = np.where(pulse[0] > TOUCHING * pulse[0].max(axis=-1, keepdims=True), pulse[0], 0.0)
     middle = step * float((pushed @ (np.arange(float(n)) + 0.5) / pushed.sum(axis=-1)).mean())
-    return FromRecords(curves, decay, len(good), tuple(notes), (), middle)
+    return FromRecords(curves, decay, len(good), tuple(notes), (), middle, n * step)
 
 
 def _apart(files: Sequence[tuple[Path, Sequence[Motion]]], names: str) -> Question | None:
@@ -100,8 +103,9 @@ def _usable(files: Sequence[tuple[Path, Sequence[Motion]]], step: float, form: R
         own, said = hits_of(path, motions, step, form)
         hits += len(own)
         notes += said
+        limits = limits_of(own)
         for hit in own:
-            if (wrong := fault(hit, ends, step, form)) is None:
+            if (wrong := fault(hit, ends, step, form, limits)) is None:
                 good.append(hit)
             else:
                 left_out.append(f"{hit.where}: left out, {wrong}")

@@ -42,6 +42,15 @@ def test_how_sure_dampings_are_may_be_told_for_all_of_them(tmp_path):
     assert "damping_sd_percent" not in (tmp_path / "sure.toml").read_text()
 
 
+@pytest.mark.parametrize(("scale", "doubts"), [(1e-3, 1), (1.0, 0), (1e3, 1)])
+def test_modes_far_from_where_the_scene_is_hit_are_doubted(tmp_path, scale, doubts):
+    """In kHz where Hz are told: FRFs were doubted, tables were not."""
+    (tmp_path / "T20.csv").write_text(f"frequency\n{1002.5 * scale}\n{1545 * scale}\n")
+    (tmp_path / "m.toml").write_text('frequency_sd_Hz = 0.5\n[[tests]]\nid = "T20"\ntemperature_C = 20\nspeed_rpm = 0\n')
+    said = bring([tmp_path / "T20.csv"], mapping=tmp_path / "m.toml", scene=SCENE, out=tmp_path / "c").values["warnings"]
+    assert said == [f"test T20: 2 modes from {1002.5 * scale:g} to {1545 * scale:g} Hz, and the hammer test of hdd_2003 is from 400 to 6000 Hz: are they in another unit?"] * doubts
+
+
 def test_modes_picked_by_hand(tmp_path):
     """The easiest start: a frequency a row, damping in percent, a decimal comma."""
     (tmp_path / "peaks.csv").write_text("test;mode;frequency [Hz];damping %\nT20;1;1002,5;0,5\nT20;2;1545;\n")
@@ -49,6 +58,40 @@ def test_modes_picked_by_hand(tmp_path):
     bring([tmp_path / "peaks.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
     rows = read_campaign(tmp_path / "c").tests[0].modes
     assert [(r.mode, r.frequency, r.frequency_sd, r.damping_ratio) for r in rows] == [(1, 1002.5, 0.5, 0.005), (2, 1545.0, 0.5, None)]
+
+
+def told_by(folder, table, more=""):
+    """The modes of a table, and what was said of it."""
+    (folder / "T20.csv").write_text(table)
+    (folder / "m.toml").write_text(f'frequency_sd_Hz = 0.5\n{more}[[tests]]\nid = "T20"\ntemperature_C = 20\nspeed_rpm = 0\n')
+    notes = bring([folder / "T20.csv"], mapping=folder / "m.toml", scene=SCENE, out=folder / "c").values["notes"]
+    return read_campaign(folder / "c").tests[0].modes, notes
+
+
+def test_columns_that_are_not_known_are_said_to_be_left_out(tmp_path):
+    """A loss factor was dropped without a word."""
+    modes, notes = told_by(tmp_path, "mode,frequency_Hz,loss_factor,Q,\n1,1002.5,0.0108,93,\n2,1545,0.0146,70,\n")
+    assert [m.damping_ratio for m in modes] == [None, None]
+    assert any(n.startswith("T20.csv: columns that are none of a table of modes left out: loss_factor, Q; such columns are test, mode") for n in notes), notes
+
+
+def test_errors_of_dampings_may_be_in_the_same_per_cent(tmp_path):
+    modes, notes = told_by(tmp_path, "mode;frequency_Hz;frequency_sd_Hz;damping_%;damping_sd_%\n1;1002,5;0,2;0,54;0,02\n2;1545;0,4;;\n")
+    assert [(m.frequency_sd, m.damping_ratio, m.damping_ratio_sd) for m in modes] == [(0.2, pytest.approx(0.0054), pytest.approx(0.0002)), (0.4, None, None)]
+    assert notes == []
+
+
+@pytest.mark.parametrize(("unit", "found"), [("percent", [0.0054, 0.0073]), ("ratio", [0.54, 0.73])])
+def test_dampings_of_a_table_that_may_be_in_per_cent_are_asked_about(tmp_path, unit, found):
+    """As those of a UFF file are; the tests that the table names are no other ones for that."""
+    (tmp_path / "T20.csv").write_text(table := "test,mode,frequency_Hz,damping\nT20,1,1002.5,0.54\nT20,2,1545,0.73\n")
+    answer = bring([tmp_path / "T20.csv"], mapping=tmp_path / "form.toml", scene=SCENE)
+    asked = 'T20.csv: damping_unit: whether its dampings are "ratio" or "percent": 0.73, as that of 1545 Hz (line 3) is, would be 73 % or 0.73 %'
+    assert [q for q in answer.values["open"] if "damping" in q] == [asked]
+    assert 'damping_unit = "?"' in (tmp_path / "form.toml").read_text()
+    assert (tmp_path / "form.toml").read_text().count("\n[[tests]]") == 1
+    modes, _ = told_by(tmp_path, table, f'[[files]]\nfile = "T20.csv"\ndamping_unit = "{unit}"\n')
+    assert [m.damping_ratio for m in modes] == pytest.approx(found)
 
 
 def test_shapes_of_a_modal_analysis(tmp_path):

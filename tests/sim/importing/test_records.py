@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,9 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.hammer.pulse import PRE_TRIGGER
+from thermospindle.sim.importing.mapping import RecordForm
+from thermospindle.sim.importing.measured import End
+from thermospindle.sim.importing.records.hits import Hit, fault, limits_of
 from thermospindle.sim.importing.records.windows import end_needed
 
 RATE, LENGTH = 8192.0, 1.0
@@ -104,6 +109,24 @@ def test_hits_are_found_judged_and_averaged(folder, tmp_path, estimator):
     if estimator == "H1":  # what standard errors say comes true, within the bias of a force cut to its window
         ratio = np.abs(frf.value - model) / frf.sd
         assert 0.4 < np.sqrt(np.mean(ratio**2)) < 3
+
+
+def test_hits_that_are_not_of_one_length_are_asked_about_where_the_form_can_be_answered(folder, tmp_path):
+    """The answer was said to be open in a form that had no line for it; what is proposed is long enough for no hit to be lost, and as long as all of them are."""
+    head, *rows = (folder / "hammer2.csv").read_text().splitlines()
+    n, short = round(RATE * LENGTH), 6500
+    kept = [row for k in range(6) for row in rows[k * n : k * n + short]]
+    (tmp_path / "T20_n0_hammer1.csv").write_text((folder / "hammer1.csv").read_text())
+    (tmp_path / "T20_n0_hammer2.csv").write_text("\n".join([head, *(f"{k / RATE:.9g},{row.partition(',')[2]}" for k, row in enumerate(kept))]) + "\n")
+    files, form = [tmp_path / f"T20_n0_hammer{q}.csv" for q in (1, 2)], tmp_path / "form.toml"
+    bring(files, mapping=form)
+    line = next(row for row in form.read_text().splitlines() if row.startswith('hit_length_s = "?"'))
+    longest = re.search(r"one length for all hits, so that one window fits all its FRFs; at most ([\d.]+), which all of them have", line)[1]
+    assert 0.9 * short / RATE < float(longest) <= short / RATE  # what follows the last hit is shorter than a gap
+    (tmp_path / "m.toml").write_text(MAPPING.replace("hammer*", "*") + form.read_text()[form.read_text().index("[records]") :].replace('"?"', longest))
+    notes = "\n".join(bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"])
+    assert "4 of 6 hits" in notes
+    assert "6 of 6 hits" in notes
 
 
 def test_force_and_response_exchanged_are_said_to_be(folder, tmp_path):
@@ -330,6 +353,43 @@ def test_all_channels_in_one_array(tmp_path, order):
     np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force)[:3], velocity=motion, resp_nodes=np.array([1, 2]))
     with pytest.raises(BadInput, match="its force force 3 of"):
         bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
+
+
+def recorded(sizes, limit=np.inf, quantum=0.0):
+    """Hits of one record whose response rings from these sizes on, cut off at the limit of its channel and in steps of `quantum`."""
+    random, t = np.random.default_rng(8), np.arange(4000) / RATE
+    force = np.where(t < 1e-3, np.sin(np.pi * t / 1e-3), 0.0) + 1e-3 * random.standard_normal(len(t))
+    hits = []
+    for k, size in enumerate(sizes, 1):
+        ringing = np.exp(-20 * t) * np.cos(2 * np.pi * 800 * t) * (1 + 1e-4 * random.standard_normal(len(t)))
+        value = np.clip(size * ringing / np.abs(ringing).max(), -limit, limit)
+        value = quantum * np.round(value / quantum) if quantum else value
+        hits.append(Hit(f"a.csv: hit {k}", force, 1.0, value[None], value[None]))
+    return hits
+
+
+@pytest.mark.parametrize(
+    ("sizes", "limit", "quantum", "left_out"),
+    [
+        ((1.001, 1.0005, 2.0, 0.8), 1.0, 0.0, [1, 2, 3]),  # the limit is where the third stands
+        ((1.001, 1.0005, 0.8), 1.0, 0.0, []),  # it stands nowhere: two largest values that are the same
+        ((1.001, 1.0005, 1.002), np.inf, 0.01, []),  # alike in coarse steps alone
+    ],
+)
+def test_a_limit_that_one_hit_tells_holds_for_all_of_its_record(sizes, limit, quantum, left_out):
+    """Those that reached it once were kept beside one that was cut off, and FRFs were 7 % wrong."""
+    hits = recorded(sizes, limit, quantum)
+    limits = limits_of(hits)
+    said = {k: why for k, h in enumerate(hits, 1) if (why := fault(h, [End(1)], 1 / RATE, RecordForm(), limits))}
+    assert [*said] == left_out
+    if left_out:
+        assert re.fullmatch(r"overload: response 1 reaches -?1, the limit at which hit 3 stands \d+ times", said[1])
+
+
+def test_what_another_hit_exceeds_is_no_limit_of_the_record():
+    hits = [*recorded((1.001, 2.0), 1.0), *recorded((1.5,))]
+    assert limits_of(hits) == [None, None]
+    assert [fault(h, [End(1)], 1 / RATE, RecordForm(), limits_of(hits)) is None for h in hits] == [True, False, True]
 
 
 def test_a_window_is_for_what_rings_and_not_for_noise():

@@ -116,6 +116,12 @@ def test_a_value_that_is_no_number_is_named_by_its_line_where_no_axis_is_told(tm
         ("frequency,mode\n1_000,1\n", "line 2: frequency = '1_000': is no number"),
         ("frequency,mode\n1000,1\ninf,2\n", "line 3: frequency = 'inf': a positive number in Hz is needed"),
         *((f"frequency,mode,sd\n1000,1,{sd}\n", f"line 2: sd = '{sd}': a positive number in Hz is needed") for sd in ("0", "-1", "nan", "1e400")),
+        ("test,mode,frequency,damping_%\nT20,1,1002.5,-0.54\n", "line 2: damping_% = '-0.54': a positive number is needed"),
+        ("mode,frequency,frequency_sd_Hz\n1,1000,-0.2\n", "line 2: frequency_sd_Hz = '-0.2': a positive number in Hz is needed"),
+        ("mode,frequency,zeta\n1,1000,1.2\n", "line 2: zeta = 1.2: a ratio above 0 and below 1 is allowed; in percent under the heading damping_%, or with damping_unit"),
+        ("mode,frequency,damping_%\n1,1000,120\n", "line 2: damping_% = 120: below 100 per cent is allowed"),
+        ("test,mode,frequency\nT20,1,1002.5\nT40,1,1000\nT20,1,1545\n", "line 4: mode = '1': stands in line 2 already, of test T20; each mode of a test may stand once"),
+        ("No,frequency\n1,1002.5\n1,1545\n", "line 3: No = '1': stands in line 2 already; each mode of a test may stand once"),
         ("frequency,mode,kind\n1000,1," + 200_000 * "a", "cannot be read as a table of modes"),
     ],
 )
@@ -163,7 +169,15 @@ def test_frequencies_of_modes_have_many_names(tmp_path, text):
 @pytest.mark.parametrize("text", ["test,mode,frequency_kHz\ncold,1,1.0025\n", "frequency_kHz\n1.0025\n", "test;f (kHz)\ncold;1,0025\n"])
 def test_modes_may_be_told_in_kilohertz(tmp_path, text):
     (tmp_path / "peaks.csv").write_text(text)
-    assert [m.frequency for m in from_modes(tmp_path / "peaks.csv").modes] == [pytest.approx(1002.5)]
+    assert [m.frequency for m in from_modes(tmp_path / "peaks.csv", FileForm(file="x")).modes] == [pytest.approx(1002.5)]
+
+
+@pytest.mark.parametrize(("line", "said"), [("400,1,2", "one line"), ("0,1,2", "no line above 0 Hz")])
+def test_one_line_is_no_frf(tmp_path, line, said):
+    """It was said not to rise from line to line, and one at 0 Hz ended in a traceback."""
+    (tmp_path / "T20.csv").write_text(f"Frequency [Hz],H(1,1) real [m/s/N],H(1,1) imag [m/s/N]\n{line}\n")
+    with pytest.raises(BadInput, match=rf"T20.csv: H\(1,1\) real.*: {said} is no FRF; at least 16 are needed"):
+        imported(tmp_path, "", tmp_path / "T20.csv")
 
 
 def test_lines_may_be_told_in_kilohertz(tmp_path):
