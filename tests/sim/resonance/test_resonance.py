@@ -13,9 +13,11 @@ from rich.console import Console
 from tests.sim.resonance.conftest import NOMINAL
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import lines, row_kinematics
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import modes
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.resonance import figures
 from thermospindle.report.log.read import read_log
@@ -24,6 +26,7 @@ from thermospindle.report.log.turning.map import summary, write_map_log
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import strongest
+from thermospindle.sim.resonance.grid import Grid
 from thermospindle.sim.resonance.map import resonance_map
 from thermospindle.sim.resonance.point import Exact, key, nrro_rms
 from thermospindle.sim.running.excitation import harmonics, response
@@ -303,3 +306,14 @@ def test_map_takes_the_mean_over_the_places_of_the_cages(spindle):
         squares.append(sum((np.abs(x) ** 2).sum() / 4 for x in together.values()))
     assert np.sqrt(np.mean(squares)) == pytest.approx(nrro_rms(Exact(point, {}, {}, 3))[0], rel=1e-6)
     assert np.abs(np.sqrt(squares) / np.sqrt(np.mean(squares)) - 1).max() > 0.1
+
+
+def test_few_speeds_are_followed_as_many_are():
+    """Modes of a grinding spindle at rest and at 60,000 rpm alone: axial ones fall past others, with which they changed places by frequency."""
+    grinding, told = load(SCENE.parent / "templates" / "grinding.toml"), []
+    for count in (2, 21):
+        grid = Grid(grinding, Condition(22.0), 1, grinding.hammer.band[1], Imperfections(unbalance=1e-9))
+        tracks, _ = grid.follow(np.array([22.0]), np.linspace(0, 60000, count) * RPM, lambda words: None)
+        told.append({axial: sorted(float(t.frequency[0, -1]) for t in tracks if (t.kind == "axial") == axial) for axial in (True, False)})
+    assert (len(told[0][True]), len(told[0][False])) == (2, 8)
+    assert told[0] == {axial: pytest.approx(own, rel=1e-9) for axial, own in told[1].items()}
