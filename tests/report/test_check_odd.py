@@ -49,6 +49,8 @@ ODD = [
     ("machine-tool", 'sprung_bearings = ["rear1", "rear2"]', 'sprung_bearings = ["rear1"]', "rear2 is loaded the same way as rear1, and only the latter on the spring"),
     ("hdd", "reference_temperature_C = 20.0", "axial_load_N = 60.0\nreference_temperature_C = 20.0", "carries nothing at the reference temperature, at rest"),
     ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
+    ("rotor", "unbalance_z_mm = 225.0", "unbalance_z_mm = 925.0", "imperfections.unbalance_z_mm = 925: lies beyond 'shaft', on which it acts, which spans 0 to 600"),
+    ("rotor", "unbalance_z_mm = 225.0", 'unbalance_z_mm = 385.0\nunbalance_body = "disc"', "unbalance_z_mm = 385: lies beyond 'disc', on which it acts, whose centre of mass is at 225"),
     ("mk7702", "longest_element_mm = 20.0", "longest_element_mm = 90.0", "the shaft's elements are long for the band of the hammer test: the mode at"),
     ("rotor", "outer_mm = [[30, 600]]", "outer_mm = [[30, 300], [150, 300]]", "its diameter jumps from 30 to 150 mm at z_mm = 300"),
 ]  # fmt: skip
