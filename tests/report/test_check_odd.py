@@ -33,6 +33,8 @@ ODD = [
     ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [90, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 45 mm there"),
     ("five_bearing", "band_Hz = [300.0, 4000.0]", "band_Hz = [1000.0, 4000.0]", "natural frequencies below the band"),
     ("five_bearing", "record_length_s = 0.25", "record_length_s = 0.02", "has not died out when the record of 0.02 s ends"),
+    ("hdd", "nominal_speed_rpm = 7200.0", "nominal_speed_rpm = 60000.0", "bearing_pair.ball_inertia = 0: the balls of lower and upper have no centrifugal force"),
+    ("grinding", "# ball_inertia = 1.0", "ball_inertia = 0.0 # ", "ball_inertia = 0: the balls of "),
     ("hdd", "thermal_expansion_um_per_m_K = 23.0", "thermal_expansion_um_per_m_K = 23.0e-6", "material aluminium: expands by 2.3e-05 um/m in a kelvin"),
     ("hdd", "density_kg_per_m3 = 7800.0", "density_kg_per_m3 = 7.8", "material steel: has 7.8 kg/m3, less than any solid part"),
     ("hdd", "preload_N = 16.0", "preload_N = 15.0", "at 60 C the preload is less than half that of the reference: lower 2."),
