@@ -202,7 +202,8 @@ def _running(found: Looked) -> Iterator[str]:
     for joint in spindle.structure.joints:
         for one, other in (joint.bodies, joint.bodies[::-1]):
             if one in turning and other not in turning:
-                yield f"joint {joint.name}: {one!r} turns and {other!r} does not, so that what hangs on it has no gyroscopic moment"
+                of = spindle.structure.carrier
+                yield f"joint {joint.name}: {of(one)!r} turns and {of(other)!r} does not, so that what hangs on it has no gyroscopic moment"
     if spindle.regions and spindle.bearings and not spindle.thermal.sources and not spindle.thermal.convections:
         yield "nothing cools the section"
 
