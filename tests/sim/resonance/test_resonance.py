@@ -136,9 +136,27 @@ def test_without_imperfections_a_plausible_set_is_drawn(spindle):
 
 def test_grids_that_make_no_map(spindle):
     with pytest.raises(BadInput, match="two different"):
-        resonance_map(spindle, [20.0], [0.0, 700.0], NOMINAL)
+        resonance_map(spindle, [20.0, 30.0], [NOMINAL.speed], NOMINAL)
     with pytest.raises(BadInput, match="negative"):
         resonance_map(spindle, [20.0, 30.0], [-700.0, 700.0], NOMINAL)
+
+
+def test_one_temperature_makes_a_campbell_diagram(tmp_path, capsys):
+    """With the numbers of a map over several, and without the pictures over temperature; it was refused."""
+    asked = ["map", str(SCENE), "--speeds", "3600", "7200", "--json", "--temperatures", "20"]
+    assert main([*asked, "--out", str(tmp_path / "one")]) == 0
+    one = json.loads(capsys.readouterr().out)
+    assert main([*asked, "30"]) == 0
+    more = json.loads(capsys.readouterr().out)
+    assert [m["frequency_Hz"] for m in one["modes"]] == [m["frequency_Hz"][:1] for m in more["modes"]]
+    assert one["nrro_um"]["over_speed"]["speed_rpm"][-1] == 7200.0
+    assert one["mapped"].startswith("Mapped at one temperature, 20 C, and at 2 speeds")
+    assert "crosses no line at 20 C" in one["sentences"][0]
+    assert {p.name for p in (tmp_path / "one").glob("*.png")} == {"campbell.png", "nrro.png"}
+    assert main(["inspect", str(tmp_path / "one" / "map.rrd")]) == 0
+    assert "modes at 1 temperature x 2 speeds" in capsys.readouterr().out
+    assert main(["map", str(SCENE), "--speeds", "7200"]) == 2
+    assert "--speeds 7200: a map needs at least two different ones, the nominal 7200 rpm included" in capsys.readouterr().err
 
 
 def test_answer_as_json(met):
