@@ -146,10 +146,22 @@ def _write(
     for part in ("measured", "published"):
         if (file.parent / part).is_dir():
             shutil.copytree(file.parent / part, folder / part)
+    for name, table in _tables(text):
+        if ".." in table.parts:
+            raise BadInput(f"{file}: bearings.{name}.numbers.table = {str(table)!r}: lies outside the scene's folder; allowed is one within it, which a new scene gets a copy of, or an absolute path")
+        if not table.is_absolute():
+            (folder / table).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file.parent / table, folder / table)
     try:
         resolved(load(folder), catalogue)
     except BadInput as error:
         raise BadInput(str(error).replace(str(folder), str(out))) from None
+
+
+def _tables(text: str) -> list[tuple[str, Path]]:
+    """The tables of stiffness that a scene's text names, by bearing."""
+    bearings = tomllib.loads(text).get("bearings", {})
+    return [(name, Path(b["numbers"]["table"])) for name, b in bearings.items() if "table" in b.get("numbers", {})]
 
 
 def _added(effect: Effect, spindle: Spindle, fitted: Mapping[str, float], by_hand: Mapping[str, float], diagnosis: Path | None) -> Added:

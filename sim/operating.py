@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from itertools import pairwise
@@ -20,6 +20,7 @@ from thermospindle.model.files.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.pressure import pressures
 from thermospindle.model.rotor import mjcf
+from thermospindle.model.rotor.beam import at_temperature
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base
 from thermospindle.model.rotor.loaded import loaded
 from thermospindle.model.rotor.modes import Mode, frf, modes, point_rows
@@ -182,7 +183,9 @@ def _region_temperatures(spindle: Spindle, condition: Condition, effects: Sequen
 
 
 def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> Spindle:
-    """The drawing as effects leave it at a condition."""
+    """The drawing at a condition's temperature, whose shafts have the moduli of it, as effects leave it."""
+    structure = at_temperature(spindle.structure, spindle.materials, spindle.reference_temperature, condition.temperature)
+    spindle = spindle if structure is spindle.structure else replace(spindle, structure=structure)
     for effect, values in effects:
         if effect.spindle:
             spindle = effect.spindle(spindle, condition, values)

@@ -55,6 +55,23 @@ def test_add_writes_a_scene_whose_modes_move(capsys, tmp_path):
     assert pair[1] == pytest.approx(3859, rel=0.01)  # tests/data/foreign_bond at 60 C: another program, this bond, tolerances of 1.5 %
 
 
+def test_tables_that_a_scene_names_come_along(capsys, tmp_path):
+    """Within its folder; of one outside the sentence says what to do."""
+    old, table = tmp_path / "old", "tables/left.csv"
+    (old / "tables").mkdir(parents=True)
+    text = (SCENE.parent / "templates" / "rotor.toml").read_text(encoding="utf-8")
+    text = text.replace("radial_stiffness_N_per_um = 20.0", f'table = "{table}"', 1)
+    (old / "spindle.toml").write_text(text, encoding="utf-8")
+    (old / table).write_text("temperature_C,speed_rpm,radial_stiffness_N_per_m,axial_stiffness_N_per_m\n20,0,2e7,1e6\n60,0,1.8e7,1e6\n", encoding="utf-8")
+    answer(capsys, "add", old, "sensor_mass", "--out", tmp_path / "new", "--json")
+    assert (tmp_path / "new" / table).read_bytes() == (old / table).read_bytes()
+    (old / table).rename(tmp_path / "left.csv")
+    (old / "spindle.toml").write_text(text.replace(table, "../left.csv"), encoding="utf-8")
+    said = refused(capsys, "add", old, "sensor_mass", "--out", tmp_path / "more")
+    assert "bearings.left.numbers.table = '../left.csv': lies outside the scene's folder; allowed is one within it" in said
+    assert not (tmp_path / "more").exists()
+
+
 def test_added_at_its_neutral_value_an_effect_moves_nothing(capsys, tmp_path):
     answer(capsys, "add", SCENE, "preload_loss", "--set", "loss=0", "--out", tmp_path / "n", "--json")
     assert frequencies(capsys, tmp_path / "n") == frequencies(capsys, SCENE)

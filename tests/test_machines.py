@@ -83,6 +83,29 @@ def test_a_wrong_entry_is_named(right: str, wrong: str, why: str, tmp_path: Path
     assert said.count("\n") == 1
 
 
+def test_a_joint_beyond_its_shaft_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As bearings and points are: a disc's seat typed 300 mm beyond the end was computed with, on the last node and an arm."""
+    text = (ROOT / "scenes" / "templates" / "rotor.toml").read_text(encoding="utf-8").replace("z_mm = 225.0                       # where", "z_mm = 925.0  # where", 1)
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    assert main(["modes", str(tmp_path)]) == 2
+    assert "structure.joints.disc seat: at z_mm = 925 beyond the shaft 'shaft', which spans 0 to 600" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "right", "wrong", "why"),
+    [
+        ("rotor", 'between = ["shaft", "disc"]', 'between = ["shaft", "shaft"]', "structure.joints.disc seat.between: 'shaft' stands twice"),
+        ("grinding", "turns = true", "turns = false", "its rings, on 'spindle' and 'housing', turn alike"),
+    ],
+)
+def test_a_shaft_is_told_by_its_name(name: str, right: str, wrong: str, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Not by that of its node there, which the scene does not have."""
+    text = (ROOT / "scenes" / "templates" / f"{name}.toml").read_text(encoding="utf-8")
+    (tmp_path / "spindle.toml").write_text(text.replace(right, wrong), encoding="utf-8")
+    assert main(["modes", str(tmp_path)]) == 2
+    assert why in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("words", [f"static {MK}", f"static {FIVE}", f"table {FIVE} --temperatures 20", "effects"], ids=["mk", "five", "table", "effects"])
 def test_tables_are_whole_at_80_columns(words: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")

@@ -50,6 +50,21 @@ def test_designs_stand_side_by_side_as_each_is_alone(tmp_path, capsys):
     assert files(out) == files(tmp_path / "again")
 
 
+def test_what_does_not_repeat_is_unknown_without_balls(tmp_path, capsys):
+    """Of bearings given by numbers: a study and a runout told it as 0, where maps and comparisons leave it out."""
+    text = COMPARED.replace("comparison", "monte-carlo").replace('scenes = ["hdd_2003", "mk7702"]', 'scene = "mk7702"')
+    out, rows = study(tmp_path, text + "draws = 3\nrunout = true\n")
+    condition = json.loads(capsys.readouterr().out)["conditions"][0]
+    assert "rro_um" in condition
+    assert not any("nrro" in key for key in [*condition, *rows[0]])
+    assert (out / "spread.png").is_file()
+    assert main(["runout", str(ROOT / "scenes" / "templates" / "rotor.toml"), "--path", "linear"]) == 0
+    said = capsys.readouterr()
+    assert "roll no balls: what does not repeat every revolution (NRRO, asynchronous error motion) is unknown" in " ".join(said.err.split())
+    told = {" ".join(line.split()[:6]): line.split()[-3:] for line in said.out.splitlines() if line.strip()}
+    assert told["root mean square of the nonrepeatable"] == told["six standard deviations of the nonrepeatable"] == ["-", "-", "-"]
+
+
 def test_drawn_designs_are_drawn_apart_and_gone_on_with(tmp_path, capsys):
     out, rows = study(tmp_path, COMPARED + "draws = 10\nchunk = 4\n")
     told = json.loads(capsys.readouterr().out)

@@ -276,7 +276,7 @@ def parsers() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     )
     one(resonances)
     speed(resonances, "the nominal speed (the scene's by default)")
-    resonances.add_argument("--temperatures", type=_temperature, nargs="+", metavar="C", help="every temperature to map, that of --temperature added (the scene's range in 21 steps by default)")
+    resonances.add_argument("--temperatures", type=_temperature, nargs="+", metavar="C", help="every temperature to map, that of --temperature added; one alone makes a Campbell diagram (the scene's range in 21 steps by default)")
     speeds(resonances, "every speed to map, the nominal one added: one number is one speed and no end of a range (0 to twice the nominal speed in 41 steps by default)")
     resonances.add_argument("--multiples", type=_count(MULTIPLES), metavar="K", help="of the number of balls, and even ball orders")
     studies = verb("study", ("study", "study"), "a study from its file: a sweep, a Monte Carlo of build tolerances, a comparison of designs, or a fleet of campaigns; run again it goes on", what="file")

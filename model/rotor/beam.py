@@ -71,6 +71,24 @@ def with_shafts(structure: Structure, materials: Mapping[str, Material], tempera
     return replace(structure, bodies=(*structure.bodies, *bodies), joints=(*structure.joints, *joints))
 
 
+def at_temperature(structure: Structure, materials: Mapping[str, Material], reference: float, temperature: float) -> Structure:
+    """The structure, with moduli those at `reference` (C), at another temperature: the elements of shafts whose moduli change stiffer or softer by what their beam is; as it is where none does."""
+    changed: dict[str, Joint] = {}
+    joints = {j.name: j for j in structure.joints}
+    for shaft in structure.shafts:
+        laws = [materials[name].youngs_modulus for name in dict.fromkeys(s.material for s in shaft.segments)]
+        if any(law(temperature) != law(reference) for law in laws):
+            for before, after in zip(elements(shaft, materials, reference), elements(shaft, materials, temperature), strict=True):
+                changed[before.name] = _scaled(joints[before.name], before, after)
+    return replace(structure, joints=tuple(changed.get(j.name, j) for j in structure.joints)) if changed else structure
+
+
+def _scaled(joint: Joint, before: Joint, after: Joint) -> Joint:
+    """The joint with its stiffness changed in the ratio of two others."""
+    k = [own * b / a for own, a, b in zip(joint.stiffness, before.stiffness, after.stiffness, strict=True)]
+    return replace(joint, stiffness=(k[0], k[1], k[2], k[3], k[4]))
+
+
 def with_theory(
     structure: Structure, materials: Mapping[str, Material], temperature: float, shares: tuple[float, float] | Mapping[str, tuple[float, float]]
 ) -> Structure:
@@ -89,9 +107,7 @@ def with_theory(
             x, y, z = (i + after - before for i, after, before in zip(own.inertia, b.inertia, a.inertia, strict=True))
             changed_bodies[a.name] = replace(own, inertia=(x, y, z))
         for before, after in zip(elements(old, materials, temperature), elements(new, materials, temperature), strict=True):
-            joint = joints[before.name]
-            k = [own * b / a for own, a, b in zip(joint.stiffness, before.stiffness, after.stiffness, strict=True)]
-            changed_joints[joint.name] = replace(joint, stiffness=(k[0], k[1], k[2], k[3], k[4]))
+            changed_joints[before.name] = _scaled(joints[before.name], before, after)
     return replace(
         structure,
         bodies=tuple(changed_bodies.get(b.name, b) for b in structure.bodies),

@@ -98,7 +98,7 @@ def check_bearings(file: Path, spindle: Spindle) -> None:
             raise BadInput(
                 f"{file}: bearing_pair.turning_ring = {b.turning_ring!r}: but {b.outer_ring!r} is on the {outer.part} part"
                 if _as_pair(spindle)
-                else f"{where}.outer_ring = {b.outer_ring!r}: is on the {outer.part} part, but of its bodies {b.outer_body!r} "
+                else f"{where}.outer_ring = {b.outer_ring!r}: is on the {outer.part} part, but of its bodies {spindle.structure.carrier(b.outer_body)!r} "
                 f"{'turns' if b.turning_ring == 'outer' else 'does not turn'}"
             )
         if not inner.r[1] < b.pitch_diameter / 2 < outer.r[0]:
@@ -221,7 +221,7 @@ def check_structure(file: Path, spindle: Spindle) -> None:
             allowed = ", ".join(spindle.materials)
             raise BadInput(f"{file}: structure.joints.{joint.name}.material = {joint.material!r}: allowed are {allowed}")
         if len(set(joint.bodies)) < len(joint.bodies):
-            raise BadInput(f"{file}: structure.joints.{joint.name}.between: {joint.bodies[0]!r} stands twice; a joint lies between two bodies, or a body and ground")
+            raise BadInput(f"{file}: structure.joints.{joint.name}.between: {structure.carrier(joint.bodies[0])!r} stands twice; a joint lies between two bodies, or a body and ground")
         for name in joint.bodies:
             if name not in (*names, "ground"):
                 raise BadInput(
@@ -262,16 +262,16 @@ def _check_mountings(file: Path, spindle: Spindle) -> None:
             if name != "ground" and name not in names:
                 raise BadInput(f"{file}: bearings.{b.name}.{key} = {name!r}: allowed are {allowed}")
         if b.inner_body == b.outer_body:
-            raise BadInput(f"{file}: bearings.{b.name}: both rings are on {b.inner_body!r}; a bearing lies between two bodies")
+            raise BadInput(f"{file}: bearings.{b.name}: both rings are on {structure.carrier(b.inner_body)!r}; a bearing lies between two bodies")
     turning = {b.name for b in structure.bodies if b.turns}
     if _as_pair(spindle):
         first = spindle.bearings[0]
         wanted = first.outer_body if first.turning_ring == "outer" else first.inner_body
         if not {b.name for b in structure.bodies if structure.carrier(b.name) == structure.carrier(wanted)} == turning:
-            raise BadInput(f"{file}: structure.bodies: exactly the body {wanted!r} that carries the turning rings must have turns = true")
+            raise BadInput(f"{file}: structure.bodies: exactly the body {structure.carrier(wanted)!r} that carries the turning rings must have turns = true")
     for b in spindle.bearings:
         inner, outer = ring_speeds(spindle, b, 1.0)
         if inner == outer:
             raise BadInput(
-                f"{file}: bearings.{b.name}: its rings, on {b.inner_body!r} and {b.outer_body!r}, turn alike; one of the two must have turns = true"
+                f"{file}: bearings.{b.name}: its rings, on {structure.carrier(b.inner_body)!r} and {structure.carrier(b.outer_body)!r}, turn alike; one of the two must have turns = true"
             )

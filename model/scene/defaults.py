@@ -100,6 +100,8 @@ def assumed(scene: Told, told: Mapping[str, m.Provenance]) -> dict[str, m.Proven
             found["bearing_pair.preload_rate_N_per_m"] = m.Provenance(
                 "assumed", "assumed default: constant spring force as the ring slides, and a ring that friction holds in vibration"
             )
+    if pair is not None:
+        found["bearing_pair.ball_inertia"] = m.Provenance("assumed", "assumed default: 0, balls without inertia: no centrifugal force and no gyroscopic moment")
     if pair is None and scene.sets and scene.ball_inertia is None:
         found["ball_inertia"] = m.Provenance("assumed", "assumed default: 1, balls with their centrifugal force and gyroscopic moment")
     for shaft in scene.shafts:

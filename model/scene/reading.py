@@ -260,7 +260,10 @@ def _with_shafts(file: Path, spindle: Spindle) -> Spindle:
         if names.count(name) > 1:
             raise BadInput(f"{file}: shafts: the name {name!r} stands twice; shaft names must differ")
     for key, z, body in [(f"measuring.points.{p.node}", p.position[2], p.body) for p in spindle.points] + [
-        (f"bearings.{b.name}", b.z, body) for b in spindle.all_bearings for body in (b.inner_body, b.outer_body)
+        (f"{key}.{held.name}", held.z, body)
+        for key, parts in (("bearings", [(b, (b.inner_body, b.outer_body)) for b in spindle.all_bearings]), ("structure.joints", [(j, j.bodies) for j in spindle.structure.joints]))
+        for held, bodies in parts
+        for body in bodies
     ]:
         for shaft in spindle.structure.shafts:
             if body in shaft.bodies and not shaft.nodes[0] - SAME_HEIGHT <= z <= shaft.nodes[-1] + SAME_HEIGHT:

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.forward.linear import mass_between
+from thermospindle.model.carrier import RADIAL_LOAD, UNBALANCE, load_carrier, turning_parts, unbalanced
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.modes import lost_to_rounding, poles_below
@@ -39,6 +40,8 @@ OFF = 1.0 * MM
 """How far from its body's surface a point may lie: sensors have bases."""
 COARSE = 2e-3
 """Of a frequency, by which masses at nodes may put it off: more than measured ones are known to."""
+FAR = 3.0
+"""Radii of gyration from a centre of mass beyond which a body given by its mass is taken to have ended: a rod ends at 1.7."""
 MANY_STEPS = 1e6
 """Of integration in a virtual hammer test, some minutes of computing for a flexible shaft."""
 
@@ -199,9 +202,28 @@ def _running(found: Looked) -> Iterator[str]:
     for joint in spindle.structure.joints:
         for one, other in (joint.bodies, joint.bodies[::-1]):
             if one in turning and other not in turning:
-                yield f"joint {joint.name}: {one!r} turns and {other!r} does not, so that what hangs on it has no gyroscopic moment"
+                of = spindle.structure.carrier
+                yield f"joint {joint.name}: {of(one)!r} turns and {of(other)!r} does not, so that what hangs on it has no gyroscopic moment"
     if spindle.regions and spindle.bearings and not spindle.thermal.sources and not spindle.thermal.convections:
         yield "nothing cools the section"
+
+
+def _planes(found: Looked) -> Iterator[str]:
+    """An unbalance or a radial load at a height at which the part it acts on is not."""
+    spindle, own = found.spindle, found.spindle.imperfections
+    for key, z, told, carrier in (
+        (UNBALANCE, own.unbalance_z, own.unbalance or own.couple_unbalance, unbalanced),
+        (RADIAL_LOAD, spindle.radial_load_z, any(spindle.radial_load), load_carrier),
+    ):
+        if not told or not spindle.structure.turns:
+            continue
+        body = carrier(spindle)
+        part = spindle.structure.carrier(body.name)
+        reach = 0.0 if body.regions or part != body.name else FAR * np.sqrt(max(body.inertia[:2]) / body.mass)
+        low, high = (pick(ends) for pick, ends in zip((min, max), zip(*turning_parts(spindle)[part], strict=True), strict=True))
+        if max(low - z, z - high) > reach + SAME_HEIGHT:
+            what = f"whose centre of mass is at {low / MM:g}" if low == high else f"which spans {low / MM:g} to {high / MM:g}"
+            yield f"{key}_z_mm = {z / MM:g}: lies beyond {part!r}, on which it acts, {what}"
 
 
 def _effects(found: Looked) -> Iterator[str]:
@@ -223,5 +245,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    *OF_BEARINGS, _seats, _materials, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _effects,
+    *OF_BEARINGS, _seats, _materials, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _planes, _effects,
 )  # fmt: skip

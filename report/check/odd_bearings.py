@@ -29,12 +29,27 @@ CONTACT_ANGLE = (5.0, 60.0)
 SAG = 1.0 * MM
 """By which the weight of what turns would sink on one bearing alone: more than any gap between what turns and what stands, and seals and motors would rub."""
 GRAVITY = 9.81
+HEAVY = 0.5e6
+"""mm rev/min, speed times pitch diameter, from which balls are commonly taken with their inertia: what grease allows (Harris, Rolling Bearing Analysis, ch. 8, on high speed)."""
 
 
 def _loose(found: Looked) -> Iterator[str]:
     for state in found.reference.state.linear:
         if isinstance(state, RollerState) and state.load == 0.0:
             yield f"bearing {state.name}: its rollers are loose by {1e6 * state.clearance:.3g} um, and no load presses them: it carries nothing"
+
+
+def _massless(found: Looked) -> Iterator[str]:
+    """Balls without inertia at a speed at which they have too much of it to be left out."""
+    spindle = found.reference.spindle
+    reached = {b.name: spindle.nominal_speed / RPM * b.pitch_diameter / MM for b in spindle.bearings}
+    fast = [name for name, factor in reached.items() if factor > HEAVY]
+    if fast and not spindle.ball_inertia:
+        key = "bearing_pair.ball_inertia" if "bearing_pair.preload_N" in spindle.provenance else "ball_inertia"
+        yield (
+            f"{key} = 0: the balls of {listed(fast)} have no centrifugal force and no gyroscopic moment, so that speed changes no bearing; at the nominal speed, a speed factor n dm of "
+            f"{max(reached.values()):.2g} mm rev/min, they count: 1 takes them in"
+        )
 
 
 def _same_place(found: Looked) -> Iterator[str]:
@@ -184,4 +199,4 @@ def _constant(b: LinearBearing) -> bool:
     return len(b.temperature) * len(b.speed) == 1
 
 
-OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _same_place, _contacts, _angles, _catalogues, _soft, _preload, _half_sprung, _pressed, _pushed, _sense, _tables)
+OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _massless, _same_place, _contacts, _angles, _catalogues, _soft, _preload, _half_sprung, _pressed, _pushed, _sense, _tables)

@@ -36,9 +36,9 @@ CURVES = 14  # drawn in the map
 
 @rc_context(STYLE)
 def figures(found: ResonanceMap) -> dict[str, Figure]:
-    """By the names of their files; `nrro` only where something does not repeat."""
-    drawn = {"campbell": campbell(found), "temperature": over_temperature(found), "coincidences": both(found)}
-    return drawn | ({} if found.repeats else {"nrro": runout(found)})
+    """By the names of their files; `nrro` only where something does not repeat, and what goes over temperature only where the map has several."""
+    several = {"temperature": over_temperature(found), "coincidences": both(found)} if len(found.temperatures) > 1 else {}
+    return {"campbell": campbell(found)} | several | ({} if found.repeats else {"nrro": runout(found)})
 
 
 def drawn_lines(found: ResonanceMap) -> list[LineTrack]:
@@ -177,17 +177,17 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = Fal
 
 def runout(found: ResonanceMap) -> Figure:
     """Nonrepeatable runout of the linear response along temperature and along speed, with the coincidences passed on the way; not at rest, where there is none, for it does not grow from 0."""
-    figure = Figure(figsize=(9.6, 4.4))
-    left, right = figure.subplots(1, 2)
     t_nominal, n_nominal = found.nominal.temperature, found.nominal.speed / RPM
     at_speed = [c for c in found.coincidences if c.at_nominal_speed]
     at_temperature = [c for c in found.coincidences if abs(c.condition.temperature - t_nominal) < 1e-6]
     panels = (
-        (left, found.nrro_temperature, 1.0, at_speed, lambda c: c.condition.temperature, f"temperature at {n_nominal:.0f} rpm, °C"),
-        (right, found.nrro_speed[found.nrro_speed[:, 0] > 0], 1 / RPM, at_temperature, lambda c: c.condition.speed / RPM, f"speed at {t_nominal:g} °C, rpm"),
+        (found.nrro_temperature, 1.0, at_speed, lambda c: c.condition.temperature, f"temperature at {n_nominal:.0f} rpm, °C"),
+        (found.nrro_speed[found.nrro_speed[:, 0] > 0], 1 / RPM, at_temperature, lambda c: c.condition.speed / RPM, f"speed at {t_nominal:g} °C, rpm"),
     )
     names, paints = ("radial", "axial"), ("#7a3d8f", "#a0741a")
-    for axes, along, unit, crossed, place, label in panels:
+    shown = [panel for panel in panels if len(panel[0]) > 1]
+    figure = Figure(figsize=(9.6, 4.4))
+    for axes, (along, unit, crossed, place, label) in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         x, values = unit * along[:, 0], along[:, 1:]
         for series, name, paint in zip(values.T, names, paints, strict=True):
             axes.plot(x, 1e9 * series, color=paint, marker=".", ms=4, lw=1.0, label=f"{name}, dots: computed")

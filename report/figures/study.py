@@ -17,7 +17,7 @@ from matplotlib.patches import Rectangle
 
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import BEARINGS, INK, PALE, SAME, STYLE, colour, least_span
-from thermospindle.sim.study.rows import OF_RUNOUT, Cases
+from thermospindle.sim.study.rows import OF_RUNOUT, Cases, of_runout
 from thermospindle.sim.study.sensitivity import APART
 from thermospindle.sim.study.summary import at_conditions, first_set, frequencies, numbers
 
@@ -49,7 +49,7 @@ def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
     x = numbers(table, along)
     panels = [(f"mode {n}, Hz", y) for n, y in frequencies(table).items()][: 2 * PANELS]
     if of.study.runout:
-        panels += [(f"{key.split('_')[0].upper()} {probe}, µm", numbers(table, f"{key}.{probe}")) for key in OF_RUNOUT for probe in ("x", "axial")]
+        panels += [(f"{key.split('_')[0].upper()} {probe}, µm", numbers(table, f"{key}.{probe}")) for key in of_runout(of.spindle) for probe in ("x", "axial")]
     panels += [(f"preload {b.name}, N", numbers(table, f"preload_N.{b.name}")) for b in of.spindle.bearings]
     with rc_context(STYLE):
         figure, grid = _grid(len(panels))
@@ -132,7 +132,7 @@ def _spreads(of: Cases, table: pa.Table) -> Figure:
     modes = sorted({n for _, rows in parts for n in frequencies(rows)})[: 2 * PANELS]
     columns = {f"preload {b.name}": f"preload_N.{b.name}" for b in of.spindle.bearings}
     if of.study.runout:
-        columns |= {f"{'RRO' if key == 'rro_um' else 'NRRO 6 s.d.'} {probe}": f"{key}.{probe}" for key in OF_RUNOUT for probe in ("x", "y", "axial")}
+        columns |= {f"{'RRO' if key == 'rro_um' else 'NRRO 6 s.d.'} {probe}": f"{key}.{probe}" for key in of_runout(of.spindle) for probe in ("x", "y", "axial")}
     titles = [f"mode {n}" for n in modes] + list(columns)
     figure, grid = _grid(len(titles))
     for k, title in enumerate(titles):

@@ -87,7 +87,7 @@ def _line_of(c: Mapping[str, Any]) -> str:
 def _map_words(log: Log) -> list[str]:
     (count, modes, speeds), coincidences = log.grid[2].shape, log.rows("/numbers/coincidences")
     return [
-        f"resonance map: {modes} modes at {count} temperatures x {speeds} speeds, {len(coincidences)} coincidences",
+        f"resonance map: {modes} modes at {count} temperature{'s' * (count != 1)} x {speeds} speeds, {len(coincidences)} coincidences",
         *(
             f"{_line_of(c)} with {c['mode_kind']} mode {c['mode']} at {c['temperature_C']:.1f} C, {c['speed_rpm']:.0f} rpm, {c['frequency_Hz']:.1f} Hz"
             for c in coincidences[:10]

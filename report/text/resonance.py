@@ -113,25 +113,32 @@ def _spoken(values: Array, name: str, unit: str) -> str:
     """All of a few values, of many their number and ends."""
     if len(values) > FEW:
         return f"{len(values)} {name}s from {values[0]:g} to {values[-1]:g} {unit}"
+    if len(values) == 1:
+        return f"one {name}, {values[0]:g} {unit}"
     return f"{len(values)} {name}s, {', '.join(f'{v:g}' for v in values[:-1])} and {values[-1]:g} {unit}"
 
 
 def sentences(found: ResonanceMap) -> list[str]:
     """One sentence for every line that crosses a mode at the nominal speed, strongest first; else that none does, and the nearest."""
     rpm = f"{found.nominal.speed / RPM:g} rpm"
-    low, high = found.temperatures[0], found.temperatures[-1]
     crossed = [c for c in found.coincidences if c.at_nominal_speed]
     if not crossed:
         excited = [c for c in found.coincidences if c.strength > 0] or list(found.coincidences)
         apart = min(excited, key=lambda c: abs(c.margin), default=None)
         near = f"; nearest is {_line(apart)}, {100 * apart.margin:+z.1f} % from {_mode(apart)}" if apart else ""
-        return [f"This spindle at {rpm} crosses no line between {low:g} and {high:g} C{near}."]
+        return [f"This spindle at {rpm} crosses no line {_between(found)}{near}."]
     said = []
     for alike in _same_line(crossed):
         c = alike[0]
         meets = f"This spindle at {rpm} crosses {_line(c, [a.line.bearing for a in alike])} at {c.condition.temperature:.1f} C with {_mode(c)} at {c.frequency:.1f} Hz"
         said.append(f"{meets}; {_repeatable(found, alike) if c.repeats else _nonrepeatable(found, c)}.")
     return said
+
+
+def _between(found: ResonanceMap) -> str:
+    """The temperatures of the map, in words."""
+    low, high = found.temperatures[0], found.temperatures[-1]
+    return f"between {low:g} and {high:g} C" if low < high else f"at {low:g} C"
 
 
 def _same_line(crossed: Sequence[Coincidence]) -> list[list[Coincidence]]:
@@ -165,7 +172,7 @@ def told(found: ResonanceMap) -> list[str]:
     """What a reader is told of `sentences`: the first `SAID`, and how many more there are."""
     every, alone = sentences(found), [_all_repeats(found)] if found.repeats else []
     left = len(every) - SAID
-    many = f"So do {left} weaker lines between {found.temperatures[0]:g} and {found.temperatures[-1]:g} C; all are in coincidences.csv of spindle map --out, and in its --json."
+    many = f"So do {left} weaker lines {_between(found)}; all are in coincidences.csv of spindle map --out, and in its --json."
     return [*(every if left <= 1 else [*every[:SAID], many]), *nearby(found), *alone]
 
 
@@ -207,7 +214,7 @@ def show_map(console: Console, found: ResonanceMap) -> None:
         console.print(on_the_map(found), highlight=False)
         return
     console.print()
-    title = f"Coincidences from {found.temperatures[0]:g} to {found.temperatures[-1]:g} C, {found.speeds[0] / RPM:g} to {found.speeds[-1] / RPM:g} rpm, strongest first"
+    title = f"Coincidences {_between(found)}, {found.speeds[0] / RPM:g} to {found.speeds[-1] / RPM:g} rpm, strongest first"
     columns = ("line", "wave", "bearing", "mode", "T\nC", "speed\nrpm", "f\nHz", "strong\nnm", "NRRO\nnm rms", "margin\n%")
     show_grid(console, title, columns, [_cells(c) for c in strongest(found.coincidences)[:SHOWN]], columns[:4], keys=4)
     console.print(

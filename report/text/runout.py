@@ -38,6 +38,8 @@ STATISTICS = {
     "asynchronous_error_um": "asynchronous error motion: widest band of all revolutions at one angle",
     "once_per_revolution_um": "part once per revolution, zero to peak",
 }
+NONREPEATABLE = ("nrro_um", "nrro_rms_um", "nrro_6_sigma_um", "asynchronous_error_um")
+"""Unknown of a spindle whose bearings are all given by numbers: they roll no balls, and what is computed of it is 0."""
 MAIN = {"radial": X, "radial_y": Y, "axial": AXIAL}
 """The probe each direction is quoted from, across the axis along x and along y; the others are under `probes`."""
 SHOWN = 14  # lines in the terminal
@@ -113,14 +115,14 @@ def line_json(line: FoundLine) -> dict[str, Any]:
 # ---------------------------------------------------------------- terminal
 
 
-def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
-    """`where` names what the probes look at."""
+def show_runout(console: Console, answer: dict[str, Any], spindle: Spindle) -> None:
+    where = looked_at(spindle)
     nominal = f" ({answer['speed_from']})" if answer["speed_from"] != "--speed" else ""
     title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm{nominal}, {answer['revolutions']} revolutions{_of_part(answer, where)}, um"
     title += f" ({of_bearings(answer['status'])})"
     quoted = grid(title, ("", f"radial\n({where} x)", f"radial\n({where} y)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():
-        quoted.add_row(meaning, *(f"{answer[key][d]:.4f}" for d in MAIN))
+        quoted.add_row(meaning, *(f"{answer[key][d]:.4f}" if _known(key, spindle) else "-" for d in MAIN))
     console.print(quoted)
     console.print()
     if not answer["lines"]:
@@ -131,6 +133,10 @@ def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
         numbers = (f"{row['frequency_Hz']:.2f}", f"{row['order']:.3f}", row["direction"], f"{row['amplitude_um']:.4f}", row["whirl"])
         rows.append([*numbers, row["name"], row["cause"], _bearings(row)])
     show_grid(console, f"Strongest lines of {len(answer['lines'])}", columns, rows, (*columns[4:], "direction"), keys=2)
+
+
+def _known(key: str, spindle: Spindle) -> bool:
+    return bool(spindle.rolling) or key not in NONREPEATABLE
 
 
 def _bearings(row: dict[str, Any]) -> str:
@@ -204,7 +210,7 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
         "spectrum": "Amplitude over frequency; a mark is a line fitted at its known frequency.",
     }
     drawn = pictures(figures(runout), captions, "runout-")
-    quoted = [[escape(meaning), *(f"{1e3 * answer[key][d]:.2f}" for d in MAIN)] for key, meaning in STATISTICS.items()]
+    quoted = [[escape(meaning), *(f"{1e3 * answer[key][d]:.2f}" if _known(key, runout.point.spindle) else "-" for d in MAIN)] for key, meaning in STATISTICS.items()]
     lines = [
         [
             f"{g['frequency_Hz']:.2f}", f"{g['order']:.3f}", g["direction"], f"{1e3 * g['amplitude_um']:.2f}", escape(g["name"]),

@@ -28,7 +28,6 @@ from thermospindle.report.verbs.answer import (
 from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
 from thermospindle.sim.resonance.map import fastest, resonance_map, stages
-from thermospindle.sim.running.probes import looked_at
 from thermospindle.sim.running.runout import planned, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
 from thermospindle.sim.warmup import SHORTEST, STAGES, Warmup, warm_up
@@ -72,11 +71,13 @@ def runout(
                 "the scene names no imperfections, so nothing moves; --seed 1 draws plausible ones, and the table [imperfections] of the "
                 "scene holds its own"
             )
+        elif not spindle.rolling:
+            odd.append("the bearings are given by numbers and roll no balls: what does not repeat every revolution (NRRO, asynchronous error motion) is unknown, and not in the total")
 
         def write(folder: Path, answer: dict[str, Any]) -> None:
             write_runout(found, spindle, answer, folder, progress)
 
-        return answered(values, lambda console: show_runout(console, values, looked_at(spindle)), out, asked, write, odd)
+        return answered(values, lambda console: show_runout(console, values, spindle), out, asked, write, odd)
 
 
 def warmup(

@@ -89,7 +89,7 @@ def impact_tests(
         )
     if element != REDUCED:
         for point in points:
-            check_step(point, test.step)
+            check_step(point, test.step, "--element reduced (a hammer test without MuJoCo)")
     results = []
     for batch in batched(enumerate(points), _at_once(test)):
         hits = [[draw_hits(test, np.random.default_rng([seed, i, node])) for node in test.hammer_nodes] for i, _ in batch]
@@ -149,14 +149,15 @@ def sampling(test: HammerTest) -> tuple[int, int]:
     return every, (round(test.record_length * test.sample_rate) + MARGIN) * every
 
 
-def check_step(point: OperatingPoint, step: float) -> None:
+def check_step(point: OperatingPoint, step: float, stepless: str) -> None:
     """Refuse a step at which Runge-Kutta 4 would be unstable: |pole| step < 2.78 on the imaginary axis (Hairer & Wanner, IV.2); and loss factors of a flexible shaft, whose
-    dampers lie between all its nodes (`model.rotor.loss`): 48,000 places of tendons for 220 degrees of freedom, with which a step takes MuJoCo 78 ms in place of 0.2."""
+    dampers lie between all its nodes (`model.rotor.loss`): 48,000 places of tendons for 220 degrees of freedom, with which a step takes MuJoCo 78 ms in place of 0.2.
+    `stepless` is the option that takes no steps."""
     lossy, freedom = list(dict.fromkeys(e.group for e in point.chain.elements if e.loss_factor)), len(point.chain.dofs)
     if lossy and freedom > LARGE:
         raise BadInput(
             f"{point.spindle.file or point.spindle.name}: loss_factor of {' and '.join(lossy)}: makes dampers between all {freedom} degrees of freedom, which MuJoCo steps for {LARGE} or "
-            "fewer; allowed are --element reduced (a hammer test without MuJoCo), or damping_ratio in its place"
+            f"fewer; allowed are {stepless}, or damping_ratio in its place"
         )
     limit = 2.7 / max(abs(m.pole) for m in point.modes)
     if step > limit:

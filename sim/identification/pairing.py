@@ -49,6 +49,9 @@ FOLLOWED = Policy(width=0.1)
 """Modes of one model at two conditions: as many as there are go on; modes that cross keep their shapes."""
 FOLLOWED_BY_KIND = Policy(width=0.1, other_kind=np.inf, alone=4.0)
 """The same, and what is axial stays axial; and a mode of bearings that lose contact ends there: from one step to the next no mode moves by a sixth and changes its shape."""
+BY_SHAPE = Policy(width=1.0, alone=1.0, mixing=MIXING)
+"""Modes of one model at conditions or of parameters far apart, which may move anywhere: likeness of shape decides, a MAC of a third at least where frequencies agree
+(0.44 of one that moves by half), and what is like none has no partner."""
 IDENTIFIED = Policy(width=0.02, limit=0.02)
 """Modes identified in a virtual test, and those of the model that was tested: they differ by the identification's error only."""
 MEASURED = Policy(width=0.3, alone=1.25, mixing=MIXING)

@@ -46,11 +46,11 @@ def resonance_map(
     """The map over `temperatures` (C) and `speeds` (rad/s, not negative), to which the nominal condition is added; with `nearby` also what is met just beyond these speeds.
 
     Modes up to `highest` (Hz, the scene's band by default) at the nominal condition are followed. `imperfections` default to the
-    scene's (with those of its effects), or to a plausible set where it names none. BadInput for a grid without extent.
+    scene's (with those of its effects), or to a plausible set where it names none. BadInput for speeds without extent; of one temperature it is a Campbell diagram alone.
     """
     over_t, over_s = _with(nominal.temperature, temperatures), _with(nominal.speed, speeds)
-    if len(over_t) < 2 or len(over_s) < 2:
-        raise BadInput("temperatures and speeds: a map needs at least two different ones of each, the nominal condition included")
+    if len(over_s) < 2:
+        raise BadInput(f"--speeds {over_s[0] / RPM:g}: a map needs at least two different ones, the nominal {nominal.speed / RPM:g} rpm included")
     if over_s[0] < 0:
         raise BadInput(f"speeds: {over_s[0] / RPM:g} rpm; a map goes over speeds of one sense, so none may be negative")
     grid = Grid(spindle, nominal, multiples, highest or spindle.hammer.band[1], imperfections)
@@ -103,7 +103,7 @@ def _nearest(values: Array, value: float) -> int:
 
 def _dense(grid: Array, places: Sequence[float]) -> list[float]:
     """The grid with some values more about the first `DENSER` places, within one step of it."""
-    step = float(np.diff(grid).max())
+    step = float(np.diff(grid).max(initial=0.0))
     more = [p + share * step for p in places[:DENSER] for share in (-0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5)]
     return sorted({*grid.tolist(), *(p for p in more if grid[0] <= p <= grid[-1])})
 

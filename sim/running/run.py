@@ -163,7 +163,7 @@ def _every(points: Sequence[OperatingPoint], step: float, sample_rate: float) ->
             f"sample_rate = {sample_rate:g} Hz: allowed are whole fractions of the {1 / step:g} Hz of the integration (hammer_test.step_us)"
         )
     for point in points:
-        check_step(point, step)
+        check_step(point, step, "runout --path linear (the exact harmonic answer)")
     return every
 
 

@@ -25,7 +25,7 @@ from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.running.probes import AXIAL, X, Y
 from thermospindle.sim.study.form import MONTE_CARLO, MOST, SWEEP, Study
-from thermospindle.sim.study.rows import NONREPEATABLE, OF_RUNOUT, STIFFNESS, Cases, Row, cases
+from thermospindle.sim.study.rows import OF_RUNOUT, STIFFNESS, Cases, Row, cases
 from thermospindle.sim.study.sensitivity import spread
 from thermospindle.sim.study.summary import at_conditions, numbers
 
@@ -69,8 +69,6 @@ class Designs:
         if row["error"] and "frequency_Hz" not in row:
             return told
         told |= {name: row.get(name) for name in self.figures}
-        if not self.own[design].spindle.rolling:  # bearings given by numbers roll no balls, so that their nonrepeatable runout is not 0 but unknown
-            told |= {name: None for name in self.figures if name.startswith(NONREPEATABLE)}
         told["in_contact"] = all(row.get(f"in_contact.{b.name}", True) for b in self.own[design].spindle.bearings)
         modes = list(zip(row["frequency_Hz"], row["kind"], row["damping_ratio"], strict=True))
         for kind in self.kinds:

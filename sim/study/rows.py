@@ -19,7 +19,7 @@ from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.rotor.static import displacement
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
-from thermospindle.sim.identification.pairing import follow
+from thermospindle.sim.identification.pairing import BY_SHAPE, follow
 from thermospindle.sim.operating import OperatingPoint, operating_point, unloads
 from thermospindle.sim.running.probes import AXIAL, X, Y, hub_probes, probe_rows
 from thermospindle.sim.running.steady import steady_runout
@@ -123,7 +123,7 @@ class Cases:
             told = {**OF_ROW, **OF_BEARING} if bearing.name in names else OF_BEARING
             row |= {f"{key}.{bearing.name}": float(getattr(bearing, name)) * UNITS.get(key, 1.0) for key, name in told.items()}
         row |= {f"rro_um.{_plain(probe)}": TO_UM * r.repeatable for probe, r in seen.items()}
-        row |= {f"nrro_six_sigma_um.{_plain(probe)}": TO_UM * r.six_sigma for probe, r in seen.items()}
+        row |= {f"{NONREPEATABLE}.{_plain(probe)}": TO_UM * r.six_sigma for probe, r in seen.items() if NONREPEATABLE in of_runout(spindle)}
         row |= _stiffness(point) if self.stiffness else {}
         row |= {f"in_contact.{b.name}": bool(b.in_contact) for b in point.state.bearings}
         row |= {"frequency_Hz": [modes[i].frequency for i in kept], "damping_ratio": [modes[i].damping_ratio for i in kept]}
@@ -134,7 +134,7 @@ class Cases:
         base, own = self.own[condition]
         found = [0] * len(modes)
         if base.linear.dofs == point.linear.dofs:
-            for k, i in enumerate(follow(base.linear.mass, own, modes)):
+            for k, i in enumerate(follow(base.linear.mass, own, modes, BY_SHAPE)):
                 if i >= 0:
                     found[i] = k + 1
         return found
@@ -162,7 +162,7 @@ class Cases:
         for name in (*(b.name for b in self.spindle.bearings), *(b.name for b in self.spindle.linear_bearings)):
             fields |= {f"{key}.{name}": pa.float64() for key in OF_BEARING}
         if self.study.runout:
-            fields |= {f"{key}.{_plain(probe)}": pa.float64() for key in OF_RUNOUT for probe in (X, Y, AXIAL)}
+            fields |= {f"{key}.{_plain(probe)}": pa.float64() for key in of_runout(self.spindle) for probe in (X, Y, AXIAL)}
         return pa.schema(fields | {name: pa.list_(kind) for name, kind in MODES.items()})
 
 
@@ -178,6 +178,11 @@ def cases(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, ca
     if found.count > MOST:
         raise BadInput(f"{study.file}: draws = {study.draws}: with sobol = true that is {found.count} cases; at most {MOST} are allowed")
     return found
+
+
+def of_runout(spindle: Spindle) -> tuple[str, ...]:
+    """What of `OF_RUNOUT` is known: of bearings given by numbers, which roll no balls, what does not repeat is not 0 but unknown."""
+    return OF_RUNOUT if spindle.rolling else tuple(key for key in OF_RUNOUT if key != NONREPEATABLE)
 
 
 def _plain(probe: str) -> str:

@@ -15,7 +15,7 @@ from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.steady import steady_runout
 from thermospindle.sim.study.draws import FIRST_SET, SECOND_SET, imperfection_columns, inputs
 from thermospindle.sim.study.indices import indices
-from thermospindle.sim.study.rows import OF_RUNOUT, Cases
+from thermospindle.sim.study.rows import OF_RUNOUT, Cases, of_runout
 from thermospindle.sim.study.sensitivity import sensitivity, spread
 
 Told = dict[str, Any]
@@ -130,6 +130,7 @@ def _runout(of: Cases, point: OperatingPoint, tell: Tell) -> Told:
         key: {
             (probe := name.removeprefix("hub ")): {"nominal": TO_UM * nominal[key](r), **tell(f"{key}.{probe}")}
             for name, r in seen.items()
+            if key in of_runout(of.spindle)
         }
         for key in OF_RUNOUT
     }

@@ -19,6 +19,7 @@ from thermospindle.model.scene.reading import build
 from thermospindle.model.units import RPM
 from thermospindle.sim.hammer.test import impact_tests
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.running.run import run_spindle
 
 ETA = 0.02
 
@@ -89,6 +90,8 @@ def test_a_shaft_is_hit_without_mujoco_or_refused():
     point = operating_point(build(raw, path), Condition(20.0, 0.0))
     with pytest.raises(BadInput, match=r"loss_factor of \w+: makes dampers between all \d+ degrees of freedom.*--element reduced.*damping_ratio"):
         impact_tests([point])
+    with pytest.raises(BadInput, match=r"loss_factor of \w+: .*; allowed are runout --path linear \(the exact harmonic answer\), or damping_ratio in its place$"):
+        run_spindle([operating_point(point.spindle, Condition(20.0, 3000 * RPM))], 0.1, 12500.0)
     found = impact_tests([point], element="reduced", noise=False)[0].estimate
     exact = point.frf(found.h1.frequency, found.window_decay)
     assert np.abs(found.h1.value - exact).max() < 5e-3 * np.abs(exact).max()

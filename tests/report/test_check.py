@@ -148,13 +148,18 @@ def test_defaults_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert told["hammer_test.step_us"] == "chosen by the program"
     assert "timoshenko" in told["shafts.spindle.beam"]
     assert "thermal.convection" not in told
+    assert "bearing_pair.ball_inertia" not in told
+    pair = {a["key"]: a["what"] for a in checked(SCENES["hdd"], capsys)["assumed"]}
+    assert pair["bearing_pair.ball_inertia"] == "0, balls without inertia: no centrifugal force and no gyroscopic moment"
     assert not any(key.startswith("thermal") for key in {a["key"] for a in checked(SCENES["free_shaft"], capsys)["assumed"]})
 
 
-def test_columns_with_dashes_are_of_numbers_and_an_empty_list_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_columns_with_dashes_are_of_numbers_and_an_empty_list_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = [["front", "-", "-z", ""], ["rear", "200", "+z", "-1.5e+09, 2"]]
     assert [of_words(rows, k) for k in range(4)] == [True, False, True, False]
-    assert main(["check", str(SCENES["hdd_2003"])]) == 0
+    text = SCENES["hdd_2003"].read_text(encoding="utf-8")
+    (tmp_path / "spindle.toml").write_text(text.replace("preload_N = 16.0", "preload_N = 16.0\nball_inertia = 0.0"), encoding="utf-8")
+    assert main(["check", str(tmp_path)]) == 0
     assert "Assumed, where the scene says nothing:\n  - nothing" in capsys.readouterr().out
 
 

@@ -33,6 +33,8 @@ ODD = [
     ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [90, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 45 mm there"),
     ("five_bearing", "band_Hz = [300.0, 4000.0]", "band_Hz = [1000.0, 4000.0]", "natural frequencies below the band"),
     ("five_bearing", "record_length_s = 0.25", "record_length_s = 0.02", "has not died out when the record of 0.02 s ends"),
+    ("hdd", "nominal_speed_rpm = 7200.0", "nominal_speed_rpm = 60000.0", "bearing_pair.ball_inertia = 0: the balls of lower and upper have no centrifugal force"),
+    ("grinding", "# ball_inertia = 1.0", "ball_inertia = 0.0 # ", "ball_inertia = 0: the balls of "),
     ("hdd", "thermal_expansion_um_per_m_K = 23.0", "thermal_expansion_um_per_m_K = 23.0e-6", "material aluminium: expands by 2.3e-05 um/m in a kelvin"),
     ("hdd", "density_kg_per_m3 = 7800.0", "density_kg_per_m3 = 7.8", "material steel: has 7.8 kg/m3, less than any solid part"),
     ("hdd", "preload_N = 16.0", "preload_N = 15.0", "at 60 C the preload is less than half that of the reference: lower 2."),
@@ -49,6 +51,8 @@ ODD = [
     ("machine-tool", 'sprung_bearings = ["rear1", "rear2"]', 'sprung_bearings = ["rear1"]', "rear2 is loaded the same way as rear1, and only the latter on the spring"),
     ("hdd", "reference_temperature_C = 20.0", "axial_load_N = 60.0\nreference_temperature_C = 20.0", "carries nothing at the reference temperature, at rest"),
     ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
+    ("rotor", "unbalance_z_mm = 225.0", "unbalance_z_mm = 925.0", "imperfections.unbalance_z_mm = 925: lies beyond 'shaft', on which it acts, which spans 0 to 600"),
+    ("rotor", "unbalance_z_mm = 225.0", 'unbalance_z_mm = 385.0\nunbalance_body = "disc"', "unbalance_z_mm = 385: lies beyond 'disc', on which it acts, whose centre of mass is at 225"),
     ("mk7702", "longest_element_mm = 20.0", "longest_element_mm = 90.0", "the shaft's elements are long for the band of the hammer test: the mode at"),
     ("rotor", "outer_mm = [[30, 600]]", "outer_mm = [[30, 300], [150, 300]]", "its diameter jumps from 30 to 150 mm at z_mm = 300"),
 ]  # fmt: skip

@@ -1,12 +1,17 @@
 """The operating point with ring motions of its own, and with effects that prescribe temperatures."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from tests.conftest import ROOT
-from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition
+from thermospindle.model.material import Law
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.sim.effects.structure import shear
 from thermospindle.sim.effects.temperature import soak_lag, thermal_gradient
 from thermospindle.sim.operating import operating_point
 from thermospindle.thermal.expansion import expand
@@ -37,3 +42,19 @@ def test_where_nothing_settles_the_condition_is_named():
     """And what of it no bearing bears: the speed, by its factor."""
     with pytest.raises(NoEquilibrium, match=r"^at 20 C and 1e\+06 rpm .*did not settle.*speed factor n dm of .* in the front1, front2 and front3 bearings"):
         operating_point(load(ROOT / "scenes" / "five_bearing"), Condition(20.0, 1e6 * RPM), ())
+
+
+def test_a_shafts_modulus_follows_the_temperature():
+    """Its frequencies go with the root of E(T) / E(20 C), Poisson's ratio being the same, and effects act on top; where E is a constant nothing is touched."""
+    shaft = load(ROOT / "scenes" / "free_shaft")
+    warm = Condition(120.0)
+    assert operating_point(shaft, warm).spindle is shaft
+    steel = shaft.materials["steel"]
+    softer = replace(shaft, materials={"steel": replace(steel, youngs_modulus=Law((20.0, 120.0), (207e9, 198e9)))})
+    for effects in ((), ((shear.EFFECT, {"scale": 1.0}),)):
+        own, there = (operating_point(s, warm, effects).modes_below(5000.0) for s in (shaft, softer))
+        assert len(own) > 3
+        assert [m.frequency for m in there] == pytest.approx([np.sqrt(198 / 207) * m.frequency for m in own], rel=1e-7)
+        assert [m.frequency for m in operating_point(softer, Condition(20.0), effects).modes_below(5000.0)] == [m.frequency for m in own]
+    with pytest.raises(OutsideRange, match=r"from 20 to 120 C was asked at 130 C"):
+        operating_point(softer, Condition(130.0))

@@ -64,12 +64,17 @@ def log_numbers(recording: rr.RecordingStream, found: ResonanceMap) -> None:
         log_values(recording, "numbers/coincidences", {name: [c[name] for c in rows] for name in rows[0]})
 
 
+def _several(found: ResonanceMap) -> bool:
+    """Whether the map has more than one temperature, over which anything can be drawn."""
+    return len(found.temperatures) > 1
+
+
 def log_pictures(recording: rr.RecordingStream, found: ResonanceMap) -> None:
     """The Campbell diagram of every temperature; coincidences and the diagram over temperature, with a bar at the temperature of the moment."""
     times = _over_temperature(found)
     with rc_context(STYLE):
         log_figures(recording, "campbell", times, [campbell(found, k, CAMPBELL) for k in range(len(found.temperatures))])
-        charts = {"coincidences": both(found, SMALL, bare=True), "temperature": over_temperature(found, SMALL, bare=True)}
+        charts = {"coincidences": both(found, SMALL, bare=True), "temperature": over_temperature(found, SMALL, bare=True)} if _several(found) else {}
     for name, figure in charts.items():
         log_figure(recording, f"{name}/picture", figure)
         axes = figure.axes[0]
@@ -120,14 +125,10 @@ def summary(found: ResonanceMap) -> str:
 def blueprint(found: ResonanceMap) -> rrb.Blueprint:
     """The moving Campbell diagram, and beside it the map, the diagram over temperature and the summary; series in tabs."""
     rpm = f"{found.nominal.speed / RPM:g} rpm"
+    charts = [view("coincidences", "Where the strongest lines meet a mode (line, mode)", SMALL), view("temperature", f"Over temperature at {rpm}", SMALL)] if _several(found) else []
     overview = rrb.Horizontal(
-        view("campbell", "Campbell diagram, moving with temperature", CAMPBELL),
-        rrb.Vertical(
-            view("coincidences", "Where the strongest lines meet a mode (line, mode)", SMALL),
-            view("temperature", f"Over temperature at {rpm}", SMALL),
-            summary_view(),
-            row_shares=[1.25, 1.25, 1],
-        ),
+        view("campbell", f"Campbell diagram{', moving with temperature' * _several(found)}", CAMPBELL),
+        rrb.Vertical(*charts, summary_view(), row_shares=[*[1.25] * len(charts), 1]),
         column_shares=[1.3, 1],
         name="Overview",
     )
@@ -140,5 +141,6 @@ def blueprint(found: ResonanceMap) -> rrb.Blueprint:
             name=f"Over {over} (choose the timeline {over})",
         )
         for over, ends in whole.items()
+        if ends[0] < ends[-1]
     ]
     return window(rrb.Tabs(overview, *tabs), TEMPERATURE, fps=4.0 * TICK)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from tests.sim.identification.test_modal import eigen, sensors, spindle
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification.pairing import (
+    BY_SHAPE,
     COMPARED,
     FOLLOWED,
     FOLLOWED_BY_KIND,
@@ -107,6 +108,17 @@ def test_axial_stays_axial():
     assert partners(a, b, FOLLOWED).tolist() == [1, 0]
     assert partners(a, b, FOLLOWED_BY_KIND).tolist() == [0, 1]
     assert partners(a, known([100.0], [[0.1, 1.0]], ["axial"]), FOLLOWED_BY_KIND).tolist() == [0, -1]
+
+
+def test_what_moves_far_goes_by_shape():
+    """Modes that pass others on their way keep their shapes, pairs that lie close may turn in their plane, and what is like none has no partner."""
+    a = known([100.0, 120.0, 200.0, 201.0], np.eye(5)[:4])
+    turned = np.array([[1.0, 1.0], [1.0, -1.0]]) / np.sqrt(2)
+    b = known([121.0, 150.0, 230.0, 230.5], np.block([[np.eye(5)[1:2]], [np.eye(5)[:1]], [np.zeros((2, 2)), turned, np.zeros((2, 1))]]))
+    assert partners(a, b, BY_SHAPE)[:2].tolist() == [1, 0]
+    assert sorted(partners(a, b, BY_SHAPE)[2:]) == [2, 3]
+    other = known([121.0, 100.0], np.eye(5)[[1, 4]])
+    assert partners(a, other, BY_SHAPE).tolist() == [-1, 0, -1, -1]
 
 
 def test_kinds_stand_for_shapes_that_are_not_known():

@@ -13,9 +13,11 @@ from rich.console import Console
 from tests.sim.resonance.conftest import NOMINAL
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import lines, row_kinematics
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import modes
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.resonance import figures
 from thermospindle.report.log.read import read_log
@@ -24,6 +26,7 @@ from thermospindle.report.log.turning.map import summary, write_map_log
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import strongest
+from thermospindle.sim.resonance.grid import Grid
 from thermospindle.sim.resonance.map import resonance_map
 from thermospindle.sim.resonance.point import Exact, key, nrro_rms
 from thermospindle.sim.running.excitation import harmonics, response
@@ -133,9 +136,27 @@ def test_without_imperfections_a_plausible_set_is_drawn(spindle):
 
 def test_grids_that_make_no_map(spindle):
     with pytest.raises(BadInput, match="two different"):
-        resonance_map(spindle, [20.0], [0.0, 700.0], NOMINAL)
+        resonance_map(spindle, [20.0, 30.0], [NOMINAL.speed], NOMINAL)
     with pytest.raises(BadInput, match="negative"):
         resonance_map(spindle, [20.0, 30.0], [-700.0, 700.0], NOMINAL)
+
+
+def test_one_temperature_makes_a_campbell_diagram(tmp_path, capsys):
+    """With the numbers of a map over several, and without the pictures over temperature; it was refused."""
+    asked = ["map", str(SCENE), "--speeds", "3600", "7200", "--json", "--temperatures", "20"]
+    assert main([*asked, "--out", str(tmp_path / "one")]) == 0
+    one = json.loads(capsys.readouterr().out)
+    assert main([*asked, "30"]) == 0
+    more = json.loads(capsys.readouterr().out)
+    assert [m["frequency_Hz"] for m in one["modes"]] == [m["frequency_Hz"][:1] for m in more["modes"]]
+    assert one["nrro_um"]["over_speed"]["speed_rpm"][-1] == 7200.0
+    assert one["mapped"].startswith("Mapped at one temperature, 20 C, and at 2 speeds")
+    assert "crosses no line at 20 C" in one["sentences"][0]
+    assert {p.name for p in (tmp_path / "one").glob("*.png")} == {"campbell.png", "nrro.png"}
+    assert main(["inspect", str(tmp_path / "one" / "map.rrd")]) == 0
+    assert "modes at 1 temperature x 2 speeds" in capsys.readouterr().out
+    assert main(["map", str(SCENE), "--speeds", "7200"]) == 2
+    assert "--speeds 7200: a map needs at least two different ones, the nominal 7200 rpm included" in capsys.readouterr().err
 
 
 def test_answer_as_json(met):
@@ -303,3 +324,14 @@ def test_map_takes_the_mean_over_the_places_of_the_cages(spindle):
         squares.append(sum((np.abs(x) ** 2).sum() / 4 for x in together.values()))
     assert np.sqrt(np.mean(squares)) == pytest.approx(nrro_rms(Exact(point, {}, {}, 3))[0], rel=1e-6)
     assert np.abs(np.sqrt(squares) / np.sqrt(np.mean(squares)) - 1).max() > 0.1
+
+
+def test_few_speeds_are_followed_as_many_are():
+    """Modes of a grinding spindle at rest and at 60,000 rpm alone: axial ones fall past others, with which they changed places by frequency."""
+    grinding, told = load(SCENE.parent / "templates" / "grinding.toml"), []
+    for count in (2, 21):
+        grid = Grid(grinding, Condition(22.0), 1, grinding.hammer.band[1], Imperfections(unbalance=1e-9))
+        tracks, _ = grid.follow(np.array([22.0]), np.linspace(0, 60000, count) * RPM, lambda words: None)
+        told.append({axial: sorted(float(t.frequency[0, -1]) for t in tracks if (t.kind == "axial") == axial) for axial in (True, False)})
+    assert (len(told[0][True]), len(told[0][False])) == (2, 8)
+    assert told[0] == {axial: pytest.approx(own, rel=1e-9) for axial, own in told[1].items()}

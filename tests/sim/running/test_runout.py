@@ -273,7 +273,7 @@ def test_both_radial_probes_are_quoted(found):
     for direction, probe in (("radial", X), ("radial_y", Y), ("axial", AXIAL)):
         assert answer["rro_um"][direction] == answer["probes"][probe]["rro_um"]
     console = Console(record=True, width=120, file=io.StringIO())
-    show_runout(console, answer, "hub")
+    show_runout(console, answer, found.point.spindle)
     text = console.export_text()
     assert "(hub x)  (hub y)" in text
     assert f"{answer['rro_um']['radial_y']:.4f}" in text
