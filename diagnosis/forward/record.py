@@ -10,7 +10,7 @@ stiffness has (V^-1 dA V)_ij = -(l_i u) p_j^q (v r_j), l and r the left and righ
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -39,10 +39,6 @@ class RecordEnd:
     def read(self) -> ComplexArray:
         """What responses read of the velocity of the poles seen, (k, n_resp, L)."""
         return np.asarray((self.rows @ (self.poles.right * self.poles.value)[:, self.seen]).T[:, :, None] * self.factor / self.away[:, None, :])
-
-    def read_by(self, rows: Array) -> RecordEnd:
-        """The same end, read by other rows (n_resp, r)."""
-        return replace(self, rows=rows)
 
     @property
     def value(self) -> ComplexArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -238,7 +238,7 @@ class Response:
         """What responses would read by as much as their rows are `rows` (n_resp, n) more, (n_resp, n_ref, L), less what of it comes after the records' end."""
         columns = self.over(rows.T)
         found = _over(columns, self._driven) * self.factor[:, None]
-        return found if (end := self._late) is None else found + self._cut * end.read_by(columns.T).value
+        return found if (end := self._late) is None else found + self._cut * replace(end, rows=columns.T).value
 
     def driven(self, columns: Array, power: Integers) -> ComplexArray:
         """The force (m, n_ref, L) that appears on one vector where s^`power` times it and `columns` (r, m) is added to the dynamic stiffness, less what

@@ -149,6 +149,7 @@ def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
 
     low, high = spindle.temperatures[0], spindle.temperatures[-1]
     first, last = spindle.hammer.band
+    elsewhere = f", and the hammer test of {spindle.name} is from {first:g} to {last:g} Hz: are they in another unit?"
     found = []
     for t in campaign.tests:
         if not low - FAR <= t.temperature <= high + FAR:
@@ -156,15 +157,9 @@ def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
         if abs(t.speed) > FASTER * spindle.nominal_speed:
             found.append(f"test {t.id}: speed_rpm = {t.speed / RPM:g}, and {spindle.name} is meant for {spindle.nominal_speed / RPM:g} rpm: is it in another unit?")
         if t.frf is not None and (t.frf.frequency[-1] < first or t.frf.frequency[0] > last):
-            found.append(
-                f"test {t.id}: lines from {t.frf.frequency[0]:g} to {t.frf.frequency[-1]:g} Hz, and the hammer test of {spindle.name} is from {first:g} to {last:g} Hz: "
-                "are they in another unit?"
-            )
+            found.append(f"test {t.id}: lines from {t.frf.frequency[0]:g} to {t.frf.frequency[-1]:g} Hz{elsewhere}")
         if t.modes and not any(first / OUTSIDE <= m.frequency <= OUTSIDE * last for m in t.modes):
-            found.append(
-                f"test {t.id}: {len(t.modes)} mode{'s' * (len(t.modes) > 1)} from {t.modes[0].frequency:g} to {t.modes[-1].frequency:g} Hz, and the hammer test of {spindle.name} is from "
-                f"{first:g} to {last:g} Hz: are they in another unit?"
-            )
+            found.append(f"test {t.id}: {len(t.modes)} mode{'s' * (len(t.modes) > 1)} from {t.modes[0].frequency:g} to {t.modes[-1].frequency:g} Hz{elsewhere}")
     return found or likenesses(spindle, campaign)
 
 
