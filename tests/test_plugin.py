@@ -81,6 +81,11 @@ def test_the_parts_of_a_shift_make_it_up():
     assert abs(parts[-1]) < 0.2
 
 
+def test_a_mode_that_others_pass_keeps_its_shape(stiffly_mounted):
+    with warnings.catch_warnings(action="ignore"):
+        assert_frequency_shift(stiffly_mounted, mode="axial 3", from_C=20, to_C=100, shift_Hz=0, within=1)
+
+
 def test_lost_contact_and_a_temperature_in_kelvin_are_told():
     """A spindle without its bearings moves by nothing, and that passed without a word."""
     with warnings.catch_warnings(record=True) as said:

@@ -6,7 +6,7 @@ those of `spindle compare`, number for number.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -62,7 +62,7 @@ class Bench:
     effect_files: tuple[Path, ...] = ()
     left_out: tuple[str, ...] = ()  # tests that are left out at the beginning
     of_runout: tuple[str, ...] = ()  # tests of the campaign that have runout alone, which the bench does not show
-    modes: dict[str, list[Mode]] = field(default_factory=dict)  # of the scene as it was opened, where there are no tests
+    modes: dict[str, dict[int, Mode]] = field(default_factory=dict)  # of the scene as it was opened, by number at the first condition, where there are no tests
 
     def effect(self, name: str) -> Effect:
         return next(e for e in self.effects if e.name == name)
@@ -126,11 +126,10 @@ def open_bench(
     if campaign is None:
         if left_out:
             raise BadInput(f"--held-out {left_out[0]}: without a campaign there is no test to leave out")
-        modes = {s: _modes_there(spindle, s) for s in _conditions(spindle)}
-        shown = tuple(s for s, found in modes.items() if found is not None)
-        if not shown:
+        points = {s: point for s in _conditions(spindle) if (point := _point_there(spindle, s)) is not None}
+        if not points:
             raise BadInput(f"{file}: the bearings find no equilibrium at any temperature of the scene's range; spindle check says more")
-        return replace(bench, shown=shown, modes={s.id: found for s, found in modes.items() if found is not None})
+        return replace(bench, shown=tuple(points), modes=_numbered(bench, points))
     every = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     tests = modal_tests(every)
     if not tests.tests:
@@ -152,12 +151,20 @@ def _conditions(spindle: Spindle) -> list[Shown]:
     return found
 
 
-def _modes_there(spindle: Spindle, shown: Shown) -> list[Mode] | None:
-    """The modes at a condition, None where the spindle has no equilibrium there."""
+def _point_there(spindle: Spindle, shown: Shown) -> OperatingPoint | None:
+    """The operating point at a condition, None where the spindle has no equilibrium there."""
     try:
-        return operating_point(spindle, shown.condition).modes
+        return operating_point(spindle, shown.condition)
     except (NoEquilibrium, OutsideRange):
         return None
+
+
+def _numbered(bench: Bench, points: Mapping[Shown, OperatingPoint]) -> dict[str, dict[int, Mode]]:
+    """The modes of each condition by their numbers at the first, from where each is followed by its shape."""
+    start = next(iter(points.values()))
+    first = [m for m in start.modes if m.frequency <= ABOVE * bench.spindle.hammer.band[1]]
+    followed = {s.id: follow(start.linear.mass, first, p.modes) for s, p in points.items()}
+    return {s.id: {k: p.modes[j] for k, j in enumerate(followed[s.id], 1) if j >= 0} for s, p in points.items()}
 
 
 # ---------------------------------------------------------------- computing
@@ -211,7 +218,8 @@ def curves(bench: Bench, s: Setting, shown: Shown, response: int, hammer: int) -
 def errors(bench: Bench, s: Setting) -> Errors:
     """Errors of every mode in every test, as `spindle compare` has them; without a campaign the change from the scene as it was opened."""
     if bench.campaign is None:
-        return Errors(tuple(c for shown in bench.shown for c in _changes(bench, s, shown)), None, None)
+        changes = [_changes(bench, s, shown) for shown in bench.shown]
+        return Errors(tuple(c for cells, _ in changes for c in cells), None, None, tuple(words for _, words in changes if words))
     found = compare(built(bench, s), bench.campaign, bench.observations, frfs=False)
     cells = tuple(Cell(f"{m.number} {m.kind}", t.test.id, m.residual, m.damping_residual,
                        f"measured {m.measured:.1f} ± {m.sd:.2g} Hz, computed {m.computed:.1f} Hz") for t in found.tests for m in t.modes)  # fmt: skip
@@ -227,18 +235,21 @@ def _rms(tests: Sequence[TestComparison], s: Setting, left_out: bool) -> float |
     return rms_residual(own) if any(t.count for t in own) else None
 
 
-def _changes(bench: Bench, s: Setting, shown: Shown) -> list[Cell]:
-    first = [m for m in bench.modes[shown.id] if m.frequency <= ABOVE * bench.spindle.hammer.band[1]]
-    kinds = [m.kind for m in bench.modes[bench.shown[0].id]]  # a row has one name at all conditions
+def _changes(bench: Bench, s: Setting, shown: Shown) -> tuple[list[Cell], str]:
+    """What has become of the modes at a condition, and in words those that have no number or are not there any more."""
+    named = bench.modes[bench.shown[0].id]  # a row has one name at all conditions
+    own = bench.modes[shown.id]
     point = _point(bench, built(bench, s), shown)
-    mass, then = point.linear.mass, point.modes
+    mass, then, first = point.linear.mass, point.modes, list(own.values())
     alike = bool(first) and len(first[0].shape) == len(mass)
-    partner = follow(mass, first, then) if alike else list(range(min(len(first), len(then))))
-    return [
-        Cell(f"{k} {kinds[k - 1] if k <= len(kinds) else m.kind}", shown.id, 100 * (then[j].frequency / m.frequency - 1), 100 * (then[j].damping_ratio / m.damping_ratio - 1),
+    partner = follow(mass, first, then) if alike else [j if j < len(then) else -1 for j in range(len(first))]
+    cells = [
+        Cell(f"{k} {named[k].kind}", shown.id, 100 * (then[j].frequency / m.frequency - 1), 100 * (then[j].damping_ratio / m.damping_ratio - 1),
              f"{m.frequency:.1f} Hz as opened, {then[j].frequency:.1f} Hz now")
-        for k, (m, j) in enumerate(zip(first, partner, strict=False), 1) if j >= 0
+        for (k, m), j in zip(own.items(), partner, strict=True) if j >= 0
     ]  # fmt: skip
+    gone = [f"mode {k}, {'not here' if k not in own else f'{own[k].frequency:.0f} Hz as opened'}" for k in named if k not in {int(c.mode.split()[0]) for c in cells}]
+    return cells, f"{shown.id}: no mode has the shape of {'; '.join(gone)}" if gone else ""
 
 
 # ---------------------------------------------------------------- fitting

@@ -45,10 +45,9 @@ class Policy:
 MIXING = 0.03
 """Relative distance of two modes below which they turn in their plane at the slightest asymmetry, so that no shape of one alone is trusted."""
 
-FOLLOWED = Policy(width=0.1)
-"""Modes of one model at two conditions: as many as there are go on; modes that cross keep their shapes."""
 FOLLOWED_BY_KIND = Policy(width=0.1, other_kind=np.inf, alone=4.0)
-"""The same, and what is axial stays axial; and a mode of bearings that lose contact ends there: from one step to the next no mode moves by a sixth and changes its shape."""
+"""Modes of one model from one step to the next: modes that cross keep their shapes, and what is axial stays axial; and a mode of bearings that lose contact ends there: from one step to the
+next no mode moves by a sixth and changes its shape."""
 BY_SHAPE = Policy(width=1.0, alone=1.0, mixing=MIXING)
 """Modes of one model at conditions or of parameters far apart, which may move anywhere: likeness of shape decides, a MAC of a third at least where frequencies agree
 (0.44 of one that moves by half), and what is like none has no partner."""
@@ -278,7 +277,7 @@ def weighted(mass: Array, modes: Sequence[Mode]) -> ModeSet:
     return ModeSet(np.array([m.frequency for m in modes]), np.array([m.shape * root for m in modes]), [m.kind for m in modes])
 
 
-def follow(mass: Array, first: Sequence[Mode], then: Sequence[Mode], policy: Policy = FOLLOWED) -> list[int]:
+def follow(mass: Array, first: Sequence[Mode], then: Sequence[Mode], policy: Policy = BY_SHAPE) -> list[int]:
     """Index into `then` of the partner of every mode of `first`, both of a model with the mass matrix (n, n); -1 without one."""
     return [int(j) for j in partners(weighted(mass, first), weighted(mass, then), policy)]
 

@@ -16,7 +16,7 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import LARGE, Mode, modes
 from thermospindle.model.types import Array
-from thermospindle.sim.identification.pairing import BY_SHAPE, follow
+from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.between import Between, between, strengths
 from thermospindle.sim.resonance.between import runout as between_runout
@@ -90,7 +90,7 @@ class Grid:
             point = operating_point(self.spindle, condition)
             linear = matrices(point.chain)
             found = modes(point.chain, linear, self.reach if len(linear.mass) > LARGE else np.inf)
-            partners = follow(linear.mass, list(near.values()), found, BY_SHAPE)
+            partners = follow(linear.mass, list(near.values()), found)
             own = {k: found[p] for k, p in zip(near, partners, strict=True) if p >= 0}
             kin = row_kinematics(point.spindle, point.state)
             here = {key(line): line for line in lines(point.spindle, kin, condition.speed, self.multiples)}

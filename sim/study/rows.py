@@ -19,7 +19,7 @@ from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.rotor.static import displacement
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
-from thermospindle.sim.identification.pairing import BY_SHAPE, follow
+from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import OperatingPoint, operating_point, unloads
 from thermospindle.sim.running.probes import AXIAL, X, Y, hub_probes, probe_rows
 from thermospindle.sim.running.steady import steady_runout
@@ -134,7 +134,7 @@ class Cases:
         base, own = self.own[condition]
         found = [0] * len(modes)
         if base.linear.dofs == point.linear.dofs:
-            for k, i in enumerate(follow(base.linear.mass, own, modes, BY_SHAPE)):
+            for k, i in enumerate(follow(base.linear.mass, own, modes)):
                 if i >= 0:
                     found[i] = k + 1
         return found

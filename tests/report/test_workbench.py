@@ -57,6 +57,19 @@ def test_without_tests_the_model_stands_beside_itself(alone):
     assert benches.curves(alone, s, alone.shown[0], 3, 1).measured is None
 
 
+def test_a_row_is_one_mode_at_all_conditions(stiffly_mounted, monkeypatch):
+    """Numbered by frequency at each, the row of an axial mode held at 100 C one of the lateral ones that had passed it; and what a setting takes away is said."""
+    monkeypatch.setattr(benches, "load", lambda file: replace(stiffly_mounted, temperatures=(20.0, 100.0)))
+    crossing = benches.open_bench(SCENE)
+    assert {m[5].kind for m in crossing.modes.values()} == {"axial"}
+    assert crossing.modes["100 °C"][7].frequency == pytest.approx(3566.0, abs=1.0)
+    assert {c.frequency for c in benches.errors(crossing, Setting()).cells} == {0.0}
+    loose = state.add_effect(Setting(), crossing.effect("preload_loss"), {"loss": 0.9})
+    found = benches.errors(crossing, loose)
+    assert all(abs(c.frequency) < 1.0 for c in found.cells if c.mode == "5 axial")
+    assert next(r for r in found.remarks if r.startswith("100 °C:")).startswith("100 °C: no mode has the shape of mode 2, 1736 Hz as opened; mode 3, ")
+
+
 def test_runout_tests_are_said_not_to_be_on_the_bench(spindle, tmp_path):
     """Beside tests of modes: named on the page with what shows them; alone they are refused in a sentence."""
     modal = read_campaign(SCENE / "measured" / "jang_2003")

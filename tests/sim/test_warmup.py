@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT, coarse_warmups
+from tests.mounting import told_preload
 from thermospindle.cli import main
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.errors import BadInput, OutsideRange
@@ -122,6 +123,28 @@ def test_slowest_decay(spindle, model):
 
 
 # ------------------------------------------------------------------ the whole warm-up
+
+
+def _followed_kinds(found):
+    """Kinds of the modes at the start and of what became of each in the steady state."""
+    kinds = {m.frequency: m.kind for m in found.steady.point.modes}
+    return [(m.kind, kinds[f]) for m, f in zip(found.modes, found.steady_frequencies.tolist(), strict=True) if f == f]
+
+
+def test_steady_modes_of_a_warm_up_that_ends_early(stiffly_mounted, coarse):
+    """From its end to the steady state is nearly all the way: an axial mode that two lateral ones pass was told as one of them."""
+    found = warm_up(stiffly_mounted, SPEED, 20.0, 90.0, duration=1.0)
+    assert found.steady_frequencies[4] == pytest.approx(found.frequencies[-1, 4], abs=1.0)
+    assert [(a == "axial") == (b == "axial") for a, b in _followed_kinds(found)] == [True] * 8
+
+
+def test_modes_of_bearings_that_lose_contact_end(spindle, coarse):
+    """Rigid rings of little preload lose contact in hot air; the axial mode of 939 Hz went on as 163 Hz of a hub that rocks on what is left."""
+    found = warm_up(told_preload(spindle, 8.0), SPEED, 20.0, 100.0)
+    assert not found.steady.point.state.bearings[0].in_contact
+    kinds = _followed_kinds(found)
+    assert 0 < len(kinds) < len(found.modes)
+    assert all((a == "axial") == (b == "axial") for a, b in kinds)
 
 
 def test_energy_is_conserved_at_every_step(warm):

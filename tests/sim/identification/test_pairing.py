@@ -13,10 +13,10 @@ from thermospindle.model.units import RPM
 from thermospindle.sim.identification.pairing import (
     BY_SHAPE,
     COMPARED,
-    FOLLOWED,
     FOLLOWED_BY_KIND,
     IDENTIFIED,
     MEASURED,
+    NEAREST,
     REPEATED,
     ModeSet,
     Policy,
@@ -94,18 +94,18 @@ def test_the_cost_is_that_of_its_docstring():
 
 
 def test_as_many_as_there_are_or_none_too_dear():
-    """The same two modes, far apart: followed, left alone by measured ones, refused by a limit."""
+    """The same two modes, far apart: paired as numbers of a table, left alone by measured ones and by those of one model that are unlike, refused by a limit."""
     a, b = known([100.0], [[1.0, 0.0]]), known([200.0], [[0.0, 1.0]])
-    assert pairs(a, b, FOLLOWED).tolist() == [[0, 0]]
-    assert pairs(a, b, MEASURED).tolist() == pairs(a, b, IDENTIFIED).tolist() == []
-    assert partners(a, known([], np.zeros((0, 2))), FOLLOWED).tolist() == [-1]
+    assert pairs(a, b, NEAREST).tolist() == [[0, 0]]
+    assert pairs(a, b, MEASURED).tolist() == pairs(a, b, BY_SHAPE).tolist() == pairs(a, b, IDENTIFIED).tolist() == []
+    assert partners(a, known([], np.zeros((0, 2))), NEAREST).tolist() == [-1]
 
 
 def test_axial_stays_axial():
     """An axial and a rocking mode that nearly coincide in frequency and shape at the sensors change places by shape, not by kind."""
     a = known([100.0, 101.0], [[1.0, 0.1], [0.1, 1.0]], ["axial", "rocking"])
     b = known([100.0, 101.0], [[0.1, 1.0], [1.0, 0.1]], ["axial", "rocking"])
-    assert partners(a, b, FOLLOWED).tolist() == [1, 0]
+    assert partners(a, b, BY_SHAPE).tolist() == [1, 0]
     assert partners(a, b, FOLLOWED_BY_KIND).tolist() == [0, 1]
     assert partners(a, known([100.0], [[0.1, 1.0]], ["axial"]), FOLLOWED_BY_KIND).tolist() == [0, -1]
 
@@ -174,7 +174,7 @@ def test_close_modes_keep_their_order_unless_their_shapes_are_trusted():
     """Two rocking modes 1 % apart with swapped shapes: by order, or by shape; an axial mode between them is no part of the pair."""
     a = known([100.0, 101.0, 150.0], np.eye(3), ["rocking", "rocking", "axial"])
     b = known([100.0, 101.0, 150.0], np.eye(3)[[1, 0, 2]], ["rocking", "rocking", "axial"])
-    by_shape = partners(a, b, FOLLOWED)
+    by_shape = partners(a, b, IDENTIFIED)
     assert by_shape.tolist() == [1, 0, 2]
     assert in_order(by_shape, a, b, close=0.03).tolist() == [0, 1, 2]
     assert in_order(by_shape, a, b, close=0.03, trusted=0.3).tolist() == [1, 0, 2]

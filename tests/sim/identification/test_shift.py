@@ -31,3 +31,9 @@ def test_between_the_ends_of_a_law(spindle):
         found.append(shift.frequency_shift(measured, 2, 20.0, 60.0))
     assert found[0].value == pytest.approx(found[1].value, rel=1e-9)
     assert found[0].sd == pytest.approx(found[1].sd, rel=0.01)
+
+
+def test_an_axial_mode_that_lateral_ones_pass(stiffly_mounted):
+    """They fall by a fifth, and shifts of -599 and -334 Hz were told with a MAC of zero: the numbers of frequencies alone."""
+    assert shift.frequency_shift(stiffly_mounted, 5, 20.0, 100.0).value == pytest.approx(-0.1, abs=0.1)
+    assert shift.frequency_shift(stiffly_mounted, 7, 20.0, 100.0).value == pytest.approx(-933.0, abs=1.0)
