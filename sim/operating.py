@@ -183,7 +183,7 @@ def _region_temperatures(spindle: Spindle, condition: Condition, effects: Sequen
 
 
 def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> Spindle:
-    """The drawing at a condition's temperature, whose shafts have the moduli of it, as effects leave it."""
+    """The drawing at a condition's temperature, whose shafts and joints have the moduli of it, as effects leave it."""
     structure = at_temperature(spindle.structure, spindle.materials, spindle.reference_temperature, condition.temperature)
     spindle = spindle if structure is spindle.structure else replace(spindle, structure=structure)
     for effect, values in effects:

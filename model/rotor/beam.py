@@ -72,7 +72,8 @@ def with_shafts(structure: Structure, materials: Mapping[str, Material], tempera
 
 
 def at_temperature(structure: Structure, materials: Mapping[str, Material], reference: float, temperature: float) -> Structure:
-    """The structure, with moduli those at `reference` (C), at another temperature: the elements of shafts whose moduli change stiffer or softer by what their beam is; as it is where none does."""
+    """The structure, with moduli those at `reference` (C), at another temperature: the elements of shafts whose moduli change stiffer or softer by what their beam is, and joints in proportion to the
+    modulus of their material; as it is where none does."""
     changed: dict[str, Joint] = {}
     joints = {j.name: j for j in structure.joints}
     for shaft in structure.shafts:
@@ -80,6 +81,10 @@ def at_temperature(structure: Structure, materials: Mapping[str, Material], refe
         if any(law(temperature) != law(reference) for law in laws):
             for before, after in zip(elements(shaft, materials, reference), elements(shaft, materials, temperature), strict=True):
                 changed[before.name] = _scaled(joints[before.name], before, after)
+    for joint in structure.joints:
+        if joint.material and (ratio := materials[joint.material].youngs_modulus(temperature) / materials[joint.material].youngs_modulus(reference)) != 1.0:
+            x, y, z, tilt_x, tilt_y = (ratio * k for k in joint.stiffness)
+            changed[joint.name] = replace(joint, stiffness=(x, y, z, tilt_x, tilt_y))
     return replace(structure, joints=tuple(changed.get(j.name, j) for j in structure.joints)) if changed else structure
 
 

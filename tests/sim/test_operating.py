@@ -10,10 +10,11 @@ from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition
 from thermospindle.model.material import Law
 from thermospindle.model.scene.reading import load
+from thermospindle.model.span import temperature_range
 from thermospindle.model.units import RPM
-from thermospindle.sim.effects.structure import shear
+from thermospindle.sim.effects.structure import modulus_softening, shear
 from thermospindle.sim.effects.temperature import soak_lag, thermal_gradient
-from thermospindle.sim.operating import operating_point
+from thermospindle.sim.operating import drawing, operating_point
 from thermospindle.thermal.expansion import expand
 
 
@@ -58,3 +59,18 @@ def test_a_shafts_modulus_follows_the_temperature():
         assert [m.frequency for m in operating_point(softer, Condition(20.0), effects).modes_below(5000.0)] == [m.frequency for m in own]
     with pytest.raises(OutsideRange, match=r"from 20 to 120 C was asked at 130 C"):
         operating_point(softer, Condition(130.0))
+
+
+def test_a_joints_stiffness_follows_the_modulus_of_its_material(spindle):
+    """In proportion; at the reference by nothing, and a joint without a material stays. What an effect softens comes on top."""
+    aluminium = spindle.materials["aluminium"]
+    softer = replace(spindle, materials=spindle.materials | {"aluminium": replace(aluminium, youngs_modulus=Law((20.0, 60.0), (70e9, 63e9)))})
+    drawn = {t: drawing(softer, Condition(t), ()).structure.joints for t in (20.0, 60.0)}
+    assert drawn[20.0] == spindle.structure.joints
+    assert [j.stiffness for j in drawn[60.0]] == [pytest.approx([0.9 * k for k in j.stiffness], rel=1e-12) for j in spindle.structure.joints]
+    bare = replace(softer, structure=replace(softer.structure, joints=tuple(replace(j, material="") for j in softer.structure.joints)))
+    assert drawing(bare, Condition(60.0), ()) is bare
+    soft = {"scale": 1.0, "joint_share": 1.0}
+    both, alone = (drawing(s, Condition(60.0), ((modulus_softening.EFFECT, soft),)).structure.joints for s in (softer, spindle))
+    assert [j.stiffness for j in both] == [pytest.approx([0.9 * k for k in j.stiffness], rel=1e-12) for j in alone]
+    assert temperature_range(softer, lubricant=False) == (20.0, 60.0)
