@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from math import log10
@@ -18,17 +18,18 @@ BEYOND = 0.01  # K, to which a law goes on straight beyond its ends: computed te
 
 @dataclass(frozen=True)
 class Entries:
-    """Values of a property at rising temperatures (C)."""
+    """Values of a property at rising temperatures (C); `key` of the scene's file where they stand, empty where they stand in none."""
 
     temperature: tuple[float, ...]
     value: tuple[float, ...]
+    key: str = field(default="", compare=False, repr=False)
 
     def check(self, temperature: float | Array) -> None:
         """OutsideRange where one of some temperatures (C) lies further than `BEYOND` from a law of several entries."""
         (low, high), (least, most) = (self.temperature[0], self.temperature[-1]), (np.min(temperature), np.max(temperature))
         if not (low - BEYOND <= least and most <= high + BEYOND):
             asked = f"at {least:.6g} C" if least == most else f"from {least:.6g} to {most:.6g} C"
-            raise OutsideRange(f"a material law given from {low:g} to {high:g} C was asked {asked}")
+            raise OutsideRange(f"{f'{self.key}: a law' if self.key else 'a material law'} given from {low:g} to {high:g} C was asked {asked}")
 
     def _after(self, temperature: float) -> int:
         """The entry up to which a temperature reaches from the one before."""

@@ -62,10 +62,13 @@ class Numbers(Table):
             raise ValueError("bearing names the rows of a table; without table there are none")
         return self
 
-    def grid(self, folder: Path) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-        """Temperatures (C), speeds (rad/s) and stiffness (temperatures, speeds, 5, 5), flat."""
+    def grid(self, folder: Path, table_key: str = "table") -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+        """Temperatures (C), speeds (rad/s) and stiffness (temperatures, speeds, 5, 5), flat; `table_key` is what a refusal calls the key of a table's file."""
         if self.table is not None:
-            return _read(folder / self.table, self.bearing)
+            file, key = folder / self.table, f"{table_key} = {self.table!r}"
+            if not file.is_file():  # a pipe would be waited for, a device has no end
+                raise BadInput(f"{key}: {file}: {absent(file)}; allowed is a CSV file, told from the folder of the scene")
+            return _read(file, self.bearing, key)
         if self.matrix_SI is not None:
             k = np.array(self.matrix_SI)
         else:
@@ -74,21 +77,20 @@ class Numbers(Table):
         return (0.0,), (0.0,), tuple(float(v) for v in k.ravel())
 
 
-def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+def _read(file: Path, bearing: str | None, key: str) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
     """The grid of a table; `BadInput` where it is none, has gaps, or a column that is not known."""
-    if not file.is_file():  # a pipe would be waited for, a device has no end
-        raise BadInput(f"{file}: {absent(file)}")
     try:
         lines = [(number, line) for number, line in enumerate(file.read_text(encoding="utf-8-sig").splitlines(), 1) if line.strip() and not line.startswith("#")]
         rows = list(zip((number for number, _ in lines[1:]), csv.DictReader(line for _, line in lines), strict=True))
     except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
-        raise BadInput(f"{file}: cannot be read as a table of bearing stiffness: {error}") from None
+        raise BadInput(f"{key}: cannot be read as a table of bearing stiffness: {error}") from None
     if rows:
         _check_columns(file, [row for _, row in rows])
     if rows and bearing is not None:
         rows = [(number, row) for number, row in rows if row.get("bearing") == bearing]
     if not rows:
-        raise BadInput(f"{file}: has no rows{f' of bearing {bearing!r}' if bearing else ''}")
+        of = f" of bearing {bearing!r}" if bearing else ""
+        raise BadInput(f"{key}: {file}: has no rows{of}; allowed is a table with columns {', '.join(WHERE)} and stiffness, as `spindle table` writes it")
     known = [c for c in COLUMNS if c in rows[0][1]]
     if not set(known) & set(COLUMNS[:2]) or not set(WHERE) <= set(rows[0][1]):
         raise BadInput(f"{file}: its columns must be temperature_C, speed_rpm and {', '.join(COLUMNS)}, the last two where there are any")

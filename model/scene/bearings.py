@@ -20,10 +20,11 @@ from thermospindle.model.units import DEGREE, MM
 Three = Annotated[tuple[Positive, Positive, Positive], Strict(False)]
 
 
-def _too_many(what: str, count: int, diameter: float, pitch: float) -> str:
-    """What is said of more `balls` or `rollers` than there is room for on a pitch circle (mm)."""
+def _too_many(body: str, count: int, diameter: float, pitch: float) -> str:
+    """What is said of more bodies, each a `ball` or a `roller`, than there is room for on a pitch circle (mm)."""
     most = int(np.pi * pitch / diameter)
-    return f"{what} = {count}: so many of {diameter:g} mm do not fit on the pitch circle of {pitch:g} mm; at most {most} do, side by side"
+    room = f"at most {most} do, side by side" if most > 1 else f"{count} of them are {np.pi * pitch / count:.4g} mm at most"
+    return f"{body}s = {count}: so many of {body}_diameter_mm = {diameter:g} do not fit on the pitch circle of pitch_diameter_mm = {pitch:g}; {room}"
 
 
 class Catalogue(Table):
@@ -51,7 +52,7 @@ class BallRow(Table):
     @model_validator(mode="after")
     def _balls_fit(self) -> BallRow:
         if self.balls * self.ball_diameter_mm > np.pi * self.pitch_diameter_mm:
-            raise ValueError(_too_many("balls", self.balls, self.ball_diameter_mm, self.pitch_diameter_mm))
+            raise ValueError(_too_many("ball", self.balls, self.ball_diameter_mm, self.pitch_diameter_mm))
         if (self.contact_angle_deg is None) == (self.free_contact_angle_deg is None):
             raise ValueError("a ball row has either contact_angle_deg, under the preload, or free_contact_angle_deg, without load")
         told = [key for key in ("inner_conformity", "outer_conformity") if getattr(self, key) is not None]
@@ -94,7 +95,7 @@ class RollerRow(Table):
     @model_validator(mode="after")
     def _rollers_fit(self) -> RollerRow:
         if self.rollers * self.roller_diameter_mm > np.pi * self.pitch_diameter_mm:
-            raise ValueError(_too_many("rollers", self.rollers, self.roller_diameter_mm, self.pitch_diameter_mm))
+            raise ValueError(_too_many("roller", self.rollers, self.roller_diameter_mm, self.pitch_diameter_mm))
         if self.rows > 1 and self.row_spacing_mm is None:
             raise ValueError("row_spacing_mm is missing: the distance between the middles of rows side by side")
         if self.rows == 1 and self.row_spacing_mm is not None:
@@ -204,10 +205,10 @@ class Bearing(Table):
             told=ToldAngle(self.row, key, angle),
         )
 
-    def linear(self, name: str, inner_body: str, outer_body: str, folder: Path) -> m.LinearBearing:
-        """The bearing given by numbers; a table is read from `folder`."""
+    def linear(self, name: str, inner_body: str, outer_body: str, file: Path) -> m.LinearBearing:
+        """The bearing given by numbers; a table is read from the folder of the scene's `file`."""
         assert self.numbers is not None
-        temperature, speed, stiffness = self.numbers.grid(folder)
+        temperature, speed, stiffness = self.numbers.grid(file.parent, f"{file}: bearings.{name}.numbers.table")
         return m.LinearBearing(
             name, self.z_mm * MM, inner_body, outer_body, temperature, speed, stiffness, self.numbers.damping_ratio
         )

@@ -107,8 +107,8 @@ class LawTable(BaseModel):
             raise ValueError("temperature_C must rise and have as many entries as value")
         return self
 
-    def law(self, unit: float) -> Law:
-        return Law(tuple(self.temperature_C), tuple(unit * v for v in self.value))
+    def law(self, unit: float, key: str) -> Law:
+        return Law(tuple(self.temperature_C), tuple(unit * v for v in self.value), key)
 
 
 def _constant(value: Any) -> Any:

@@ -237,7 +237,7 @@ class Scene(Table):
                 if b.row is not None:
                     rollers.append(b.rollers(key, self.roller_rows[b.row], inner, outer))
                 else:
-                    linear.append(b.linear(key, inner, outer, file.parent))
+                    linear.append(b.linear(key, inner, outer, file))
         bearings = tuple(b.bearing(key, self.ball_rows, senses[key], mounted(key, b)) for key, b in rows.items())
         regions = tuple(r.region() for r in self.section.regions)
         points = tuple(replace(p, body=resolved_body(shafts, p.body, p.position[2])) for p in (p.point() for p in self.points()))

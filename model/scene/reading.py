@@ -153,6 +153,9 @@ def content_hash(spindle: Spindle) -> str:
             table.pop(key)
     for row in content["bearings"]:
         row.pop("told")
+    of_materials = [m[law] for m in content["materials"].values() for law in ("youngs_modulus", "thermal_expansion")]
+    for entries in (*of_materials, content["thermal"]["friction"]["viscosity"]):
+        entries.pop("key")
     if not content["roller_bearings"]:
         content.pop("roller_bearings")
     for film in content["thermal"]["convections"]:

@@ -28,9 +28,9 @@ class Material(Table):
     def material(self, name: str) -> m.Material:
         return m.Material(
             name=name,
-            youngs_modulus=self.youngs_modulus_GPa.law(1e9),
+            youngs_modulus=self.youngs_modulus_GPa.law(1e9, f"materials.{name}.youngs_modulus_GPa"),
             poisson_ratio=self.poisson_ratio,
-            thermal_expansion=self.thermal_expansion_um_per_m_K.law(1e-6),
+            thermal_expansion=self.thermal_expansion_um_per_m_K.law(1e-6, f"materials.{name}.thermal_expansion_um_per_m_K"),
             density=self.density_kg_per_m3,
             conductivity=self.conductivity_W_per_m_K,
             heat_capacity=self.heat_capacity_J_per_kg_K,

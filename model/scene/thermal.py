@@ -51,8 +51,8 @@ class Friction(Table):
         return self
 
     def viscosity(self) -> Viscosity:
-        law = self.kinematic_viscosity_mm2_per_s.law(1e-6)
-        return Viscosity(law.temperature, law.value)
+        law = self.kinematic_viscosity_mm2_per_s.law(1e-6, "thermal.friction.kinematic_viscosity_mm2_per_s")
+        return Viscosity(law.temperature, law.value, law.key)
 
 
 STILL_AIR, MOVED_AIR = 10.0, 40.0  # W/(m2 K): free convection from standing faces, and that of a face that turns

@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, STUDY
 from thermospindle.model.scene.fields import Name, Temperature, Title, first_error, format_of, read_file
+from thermospindle.model.scene.reading import scene_path
 from thermospindle.sim.campaign.form import Table
 
 SWEEP, MONTE_CARLO, FLEET, COMPARISON = "sweep", "monte-carlo", "fleet", "comparison"
@@ -151,8 +152,8 @@ def read_study(file: Path) -> Study:
         file=file,
         title=form.title,
         kind=form.kind,
-        scene=_beside(file, form.scene or form.scenes[0]),
-        scenes=tuple(_beside(file, name) for name in form.scenes),
+        scene=_beside(file, "scene", form.scene) if form.scene else _beside(file, "scenes", form.scenes[0]),
+        scenes=tuple(_beside(file, "scenes", name) for name in form.scenes),
         designs=tuple(form.scenes),
         temperatures=None if form.temperatures_C is None else tuple(form.temperatures_C),
         speeds=tuple(form.speeds_rpm or (0.0,)),
@@ -173,10 +174,15 @@ def read_study(file: Path) -> Study:
     return study
 
 
-def _beside(file: Path, name: str) -> Path:
-    """A path told in a file: from the file's folder where something is there, else as it is, as the name of a shipped scene."""
+def _beside(file: Path, key: str, name: str) -> Path:
+    """A scene told in a file: from the file's folder where something is there, else as it is, as the name of a shipped one. Raises `BadInput` where there is none."""
     there = file.parent / name
-    return there if there.exists() else Path(name)
+    scene = there if there.exists() else Path(name)
+    try:
+        scene_path(scene)
+    except BadInput as error:
+        raise BadInput(f"{file}: {key} = {name!r}: {error}") from None
+    return scene
 
 
 def _campaigns(file: Path, patterns: list[str]) -> tuple[Path, ...]:

@@ -1,11 +1,15 @@
 """Bearings given by numbers: what a table over temperature and speed may hold."""
 
+import re
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from tests.conftest import ROOT
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.bearing_numbers import Numbers
+from thermospindle.model.scene.reading import load
 
 HEADER = "temperature_C,speed_rpm,radial_stiffness_N_per_m,axial_stiffness_N_per_m"
 
@@ -71,3 +75,22 @@ def test_lines_of_a_table_of_several_bearings_are_the_file_s(tmp_path):
 def test_a_matrix_of_zeros_is_refused_as_a_table_of_zeros_is():
     with pytest.raises(ValidationError, match="matrix_SI: all entries are zero"):
         Numbers(matrix_SI=np.zeros((5, 5)).tolist(), damping_ratio=0.05)
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("gone.csv", "{}: no such file; allowed is a CSV file, told from the folder of the scene"),
+        ("", "{}: it is a folder; allowed is a CSV file"),
+        ("empty.csv", "{}: has no rows; allowed is a table with columns temperature_C, speed_rpm and stiffness"),
+    ],
+)
+def test_a_table_that_is_none_is_told_with_the_scene_and_its_key(tmp_path, table, said):
+    """The table's name alone did not say which file asks for it."""
+    scene = ROOT / "scenes" / "templates" / "rotor.toml"
+    text = re.sub(r"radial_stiffness_N_per_um = 20.0 .*\n.*\n", f'table = "{table}"\n', scene.read_text(encoding="utf-8"), count=1)
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "empty.csv").write_text(f"{HEADER}\n", encoding="utf-8")
+    with pytest.raises(BadInput) as error:
+        load(tmp_path)
+    assert str(error.value).startswith(f"{tmp_path / 'spindle.toml'}: bearings.left.numbers.table = {table!r}: {said.format(tmp_path / table)}")

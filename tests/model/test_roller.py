@@ -259,7 +259,7 @@ def test_effects_of_ball_rows_have_nothing_to_act_on() -> None:
 
 
 REFUSED = [
-    (lambda r: r["roller_rows"]["above"].update(rollers=20), "rollers = 20: so many of 1.588 mm do not fit on the pitch circle of 9.1 mm; at most 18 do"),
+    (lambda r: r["roller_rows"]["above"].update(rollers=20), "rollers = 20: so many of roller_diameter_mm = 1.588 do not fit on the pitch circle of pitch_diameter_mm = 9.1; at most 18 do"),
     (lambda r: r["roller_rows"]["above"].update(rows=2), "row_spacing_mm is missing"),
     (lambda r: r["roller_rows"]["above"].update(row_spacing_mm=2.0), "row_spacing_mm is for several rows"),
     (lambda r: r["roller_rows"]["above"].update(roller_material="brass"), "roller_material = 'brass': allowed are aluminium, steel"),

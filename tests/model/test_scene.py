@@ -113,7 +113,8 @@ REFUSED = [
     ("row-name", lambda r: r["bearings"]["upper"].update(row="x"), "bearings.upper.row = 'x'", "allowed are hdd"),
     ("pitch", lambda r: r["ball_rows"]["hdd"].update(pitch_diameter_mm=12.0), "pitch_diameter_mm = 12", "between the raceways"),
     ("ball-size", lambda r: r["ball_rows"]["hdd"].update(ball_diameter_mm=1.7), "ball_diameter_mm = 1.7", "-2 % to +5 %"),
-    ("too-many-balls", lambda r: r["ball_rows"]["hdd"].update(balls=40), "ball_rows.hdd: balls = 40: so many of 1.588 mm do not fit", "at most 18 do"),
+    ("too-many-balls", lambda r: r["ball_rows"]["hdd"].update(balls=40), "ball_rows.hdd: balls = 40: so many of ball_diameter_mm = 1.588 do not fit", "at most 18 do"),
+    ("balls-too-large", lambda r: r["ball_rows"]["hdd"].update(ball_diameter_mm=50.0), "so many of ball_diameter_mm = 50 do not fit on the pitch circle of pitch_diameter_mm = 9.1", "10 of them are 2.859 mm at most"),
     ("clearance", lambda r: r["ball_rows"]["hdd"].update(contact_angle_deg=30.0), "contact_angle_deg = 30", "contradicts"),
     ("turning-ring", lambda r: r["bearing_pair"].update(turning_ring="inner"), "turning_ring = 'inner'", "rotating part"),
     ("tandem", lambda r: r["bearing_pair"].update(arrangement="tandem"), "bearing_pair", "preload_kind must be spring"),
@@ -252,6 +253,20 @@ def test_a_law_goes_on_a_little_beyond_its_ends():
     for outside, said in ((19.98, "19.98"), (60.1, "60.1")):
         with pytest.raises(OutsideRange, match=rf"^a material law given from 20 to 60 C was asked at {said} C$"):
             law(outside)
+
+
+def test_a_law_that_does_not_reach_names_its_key(raw):
+    """Which of the scene's laws it is; that is no number of the spindle."""
+    raw["materials"]["steel"]["youngs_modulus_GPa"] = {"temperature_C": [20.0, 60.0], "value": [208.0, 205.0]}
+    spindle = build(raw, FILE)
+    with pytest.raises(OutsideRange, match=r"^materials.steel.youngs_modulus_GPa: a law given from 20 to 60 C was asked at 70 C$"):
+        spindle.materials["steel"].youngs_modulus(70.0)
+    with pytest.raises(OutsideRange, match=r"^thermal.friction.kinematic_viscosity_mm2_per_s: a law given from -20 to 120 C was asked at 130 C$"):
+        spindle.thermal.friction.viscosity(130.0)
+    law = spindle.materials["steel"].youngs_modulus
+    unnamed = replace(spindle, materials=spindle.materials | {"steel": replace(spindle.materials["steel"], youngs_modulus=Law(law.temperature, law.value))})
+    assert unnamed == spindle
+    assert content_hash(unnamed) == content_hash(spindle)
 
 
 def test_what_a_scene_leaves_out_is_assumed_and_said(raw):

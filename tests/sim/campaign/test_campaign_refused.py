@@ -73,7 +73,7 @@ TOML, UFF, CSV = "campaign.toml", "T20_n0.uff", "modes.csv"
         (edit(TOML, "id = \"T20_n0\"", "id = \"T20.5_n7200\""), "tests: id = 'T20.5_n7200' stands 2 times"),
         (edit(TOML, "T20.5_n7200.uff", "T20_n0.uff"), "file = 'T20_n0.uff' stands 2 times"),
         (edit(TOML, "\"T20_n0.uff\"", "\"../T20_n0.uff\""), "tests.T20_n0.frf = '../T20_n0.uff': must be letters"),
-        (edit(TOML, "\"T20_n0.uff\"", "\"T99.uff\""), "T99.uff: no such file"),
+        (edit(TOML, "\"T20_n0.uff\"", "\"T99.uff\""), r"campaign.toml: tests.T20_n0.frf = 'T99.uff': .*T99.uff: no such file; allowed is a file"),
         (edit(TOML, "title =", "title"), "campaign.toml: not a TOML file"),
         (edit(TOML, "node = 6", "node = 7"), r"T20_n0.uff: set 7 .*response node 6 is no point of the campaign; allowed are \[1, 3, 7\]"),
         (edit(CSV, "rocking,1738.1", "rocking,-1738.1"), "modes.csv: line 3: frequency_Hz = '-1738.1': .*greater than 0"),
