@@ -14,7 +14,7 @@ from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import INK, PALE, STYLE, spread
 from thermospindle.report.figures.warmup import LETTERS, MODES, name_ends
-from thermospindle.sim.resonance.found import Coincidence, LineTrack, ResonanceMap, Track, strongest
+from thermospindle.sim.resonance.found import ALIKE, Coincidence, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.probes import looked_at
 
@@ -179,7 +179,7 @@ def runout(found: ResonanceMap) -> Figure:
     """Nonrepeatable runout of the linear response along temperature and along speed, with the coincidences passed on the way; not at rest, where there is none, for it does not grow from 0."""
     t_nominal, n_nominal = found.nominal.temperature, found.nominal.speed / RPM
     at_speed = [c for c in found.coincidences if c.at_nominal_speed]
-    at_temperature = [c for c in found.coincidences if abs(c.condition.temperature - t_nominal) < 1e-6]
+    at_temperature = [c for c in found.coincidences if abs(c.condition.temperature - t_nominal) < ALIKE]
     panels = (
         (found.nrro_temperature, 1.0, at_speed, lambda c: c.condition.temperature, f"temperature at {n_nominal:.0f} rpm, °C"),
         (found.nrro_speed[found.nrro_speed[:, 0] > 0], 1 / RPM, at_temperature, lambda c: c.condition.speed / RPM, f"speed at {t_nominal:g} °C, rpm"),

@@ -10,12 +10,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermospindle.model.types import Array
 from thermospindle.sim.resonance.point import Exact, Key, key, rms_of_lines
 from thermospindle.sim.running.probes import speed_ratio
 
 POINTS = 4
+
+
+def passes_zero(gap: Array) -> NDArray[np.bool_]:
+    """Whether a gap (..., n) passes zero from each place to the next, (..., n - 1); one that stands on zero at a place does so on the way to it, once."""
+    before, after = gap[..., :-1], gap[..., 1:]
+    return (before * after < 0) | ((after == 0) & (np.abs(before) > 0))
 
 
 @dataclass(frozen=True)

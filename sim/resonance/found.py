@@ -10,8 +10,11 @@ import numpy as np
 from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
+from thermospindle.sim.resonance.point import key
 
 STILL = 1e-12  # m of runout that is nothing
+ALIKE = 0.1  # K, to which temperatures are told: what is met along both axes no further apart is one coincidence,
+ALIKE_SPEED = 1e-3  # where its speeds are alike to this share too
 NEARBY = 0.1  # of a speed, how far beyond those that are asked for crossings are looked for
 
 
@@ -129,3 +132,16 @@ def strongest(coincidences: Sequence[Coincidence]) -> list[Coincidence]:
     for c in sorted(coincidences, key=lambda c: -c.strength):
         best.setdefault((c.line.cause, c.line.order, c.line.direction, c.line.whirl, c.mode.number), c)
     return list(best.values())
+
+
+def once(coincidences: Sequence[Coincidence]) -> list[Coincidence]:
+    """Without those along speed that one at the nominal speed is already: a crossing of a line and a mode close to the nominal condition is met along both axes."""
+    nominal: dict[tuple, list[Condition]] = {}
+    for c in coincidences:
+        if c.at_nominal_speed:
+            nominal.setdefault((key(c.line), c.mode.number), []).append(c.condition)
+    return [c for c in coincidences if c.at_nominal_speed or not any(_alike(c.condition, other) for other in nominal.get((key(c.line), c.mode.number), ()))]
+
+
+def _alike(a: Condition, b: Condition) -> bool:
+    return abs(a.temperature - b.temperature) < ALIKE and abs(a.speed - b.speed) < ALIKE_SPEED * b.speed

@@ -18,7 +18,7 @@ from thermospindle.model.rotor.modes import LARGE, Mode, modes
 from thermospindle.model.types import Array
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.between import Between, between, strengths
+from thermospindle.sim.resonance.between import Between, between, passes_zero, strengths
 from thermospindle.sim.resonance.between import runout as between_runout
 from thermospindle.sim.resonance.critical import SENSE
 from thermospindle.sim.resonance.found import NEARBY, Coincidence, Curve, Interpolated, LineTrack, Track
@@ -150,13 +150,13 @@ class Grid:
         t0, s0 = nominal
         margin = float(gap[t0, s0] / track.frequency[t0, s0])
         found = []
-        for i in np.flatnonzero(gap[:-1, s0] * gap[1:, s0] < 0):
+        for i in np.flatnonzero(passes_zero(gap[:, s0])):
             low, high = (((float(over_t[k]), float(over_s[s0])), float(gap[k, s0])) for k in (i, i + 1))
             at = between(over_t, gap[:, s0], track.frequency[:, s0], int(i))
             found.append(Candidate(own, track, (low, high), at, margin, True))
         if len(curve.temperature):
             row = int(np.argmin(np.abs(over_t - curve.temperature[np.argmin(np.abs(curve.temperature - self.nominal.temperature))])))
-            for j in np.flatnonzero(gap[row, :-1] * gap[row, 1:] < 0):
+            for j in np.flatnonzero(passes_zero(gap[row])):
                 low, high = (((float(over_t[row]), float(over_s[k])), float(gap[row, k])) for k in (j, j + 1))
                 at = between(over_s, gap[row], track.frequency[row], int(j))
                 found.append(Candidate(own, track, (low, high), at, margin, False))

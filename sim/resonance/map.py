@@ -25,7 +25,8 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.sim.resonance.found import Curve, ResonanceMap, strongest
+from thermospindle.sim.resonance.between import passes_zero
+from thermospindle.sim.resonance.found import Curve, ResonanceMap, once, strongest
 from thermospindle.sim.resonance.grid import PARTS, Candidate, Grid, same_direction
 
 MULTIPLES = 3  # of the number of balls, and even ball orders, whose lines are drawn
@@ -71,6 +72,7 @@ def resonance_map(
     of_runout = [c for c in found if not c.repeats]  # which NRRO is made of
     crossed = [c.condition.speed for c in strongest([c for c in of_runout if c.condition.temperature == nominal.temperature])]
     met = [c.condition.temperature for c in strongest([c for c in of_runout if c.at_nominal_speed])]
+    found = once(found)
     progress(f"{len(found)} coincidences")
     along_s = np.array([(s, *grid.nrro(Condition(nominal.temperature, s), (t0, _nearest(over_s, s)))) for s in _dense(over_s, crossed)])
     along_t = np.array([(t, *grid.nrro(Condition(t, nominal.speed), (_nearest(over_t, t), s0))) for t in _dense(over_t, met)])
@@ -110,7 +112,6 @@ def _dense(grid: Array, places: Sequence[float]) -> list[float]:
 
 def _along_speed(gap: Array, over_t: Array, over_s: Array) -> tuple[Array, Array]:
     """Temperatures and speeds where `gap` (T, S) passes zero between neighbouring speeds, by linear interpolation."""
-    before, after = gap[:, :-1], gap[:, 1:]
-    i, j = np.nonzero(before * after < 0)
-    share = before[i, j] / (before[i, j] - after[i, j])
+    i, j = np.nonzero(passes_zero(gap))
+    share = gap[i, j] / (gap[i, j] - gap[i, j + 1])
     return over_t[i], over_s[j] + share * (over_s[j + 1] - over_s[j])

@@ -25,6 +25,7 @@ from thermospindle.report.log.told import describe, log_json
 from thermospindle.report.log.turning.map import summary, write_map_log
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.resonance.between import passes_zero
 from thermospindle.sim.resonance.found import strongest
 from thermospindle.sim.resonance.grid import Grid
 from thermospindle.sim.resonance.map import resonance_map
@@ -61,6 +62,22 @@ def test_no_sign_change_is_missed_at_the_nominal_speed(light, met):
     assert sorted(crossed) == sorted((key(c.line), (c.mode.kind, c.mode.whirl)) for c in listed)
     assert {c.line.bearing for c in listed} == {"lower", "upper"}
     assert {(c.line.name, c.line.order, c.mode.number) for c in listed} == {("30 (fo-fc) + fo", 31, 4)}
+
+
+def test_a_crossing_at_the_nominal_condition_is_listed_once(light, met):
+    """Met along temperature at the nominal speed and along speed at the nominal temperature, 0.0001 K and 0.01 rpm apart."""
+    c = next(c for c in met.coincidences if not c.at_nominal_speed and c.condition.speed > 0.5 * NOMINAL.speed)
+    there = Condition(c.condition.temperature, c.condition.speed)
+    around = resonance_map(light, [there.temperature - 4.0, there.temperature + 4.0], [0.5 * there.speed, 1.5 * there.speed], there)
+    alike = [x for x in around.coincidences if key(x.line) == key(c.line) and x.mode.kind == c.mode.kind and abs(x.condition.speed / there.speed - 1) < 1e-3]
+    assert [x.condition.temperature for x in alike] == [pytest.approx(there.temperature, abs=0.05)]
+    assert alike[0].at_nominal_speed
+
+
+def test_a_gap_that_stands_on_zero_is_passed_once():
+    """A crossing on a place of the grid was none."""
+    gap = np.array([[-2.0, -1.0, 0.0, 1.0], [2.0, -1.0, np.nan, 0.0], [0.0, 1.0, -1.0, 0.0]])
+    assert passes_zero(gap).tolist() == [[False, True, False], [True, False, False], [False, True, True]]
 
 
 def test_strength_is_the_peak_of_the_response(spindle, found):
