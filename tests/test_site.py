@@ -90,6 +90,17 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert dead_links(tmp_path) == []
 
 
+def test_links_of_the_repository_lead_somewhere():
+    """Pages are read there too: what `make docs` has yet to write is said to be so beside its link."""
+    for page in [ROOT / "README.md", ROOT / "CHANGELOG.md", *SITE.glob("*.md")]:
+        text = page.read_text(encoding="utf-8")
+        for link in re.finditer(r"\]\((?!https?:)([^)#\s]+)", text):
+            if link[1].startswith("generated/"):
+                assert "`make docs`" in text[link.end() : link.end() + 60], f"{page}: {link[1]}"
+            else:
+                assert (page.parent / link[1]).exists(), f"{page}: {link[1]}"
+
+
 def dead_links(site: Path) -> list[str]:
     """What pages link to within the site and is not there: a file, or a place in a page."""
     pages = {page: page.read_text(encoding="utf-8") for page in site.rglob("*.html")}
