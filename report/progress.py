@@ -33,6 +33,13 @@ def progress_bar(steps: int | Sequence[float]) -> Iterator[Callable[[str], None]
         yield lambda done: bar.update(task, advance=next(left, 0.0), description=done)
 
 
+def hint(words: str) -> None:
+    """Says before long work what is quicker."""
+    if sys.stderr is not None:
+        with suppress(OSError, ValueError):
+            print(f"spindle: hint: {visible(words)}", file=sys.stderr, flush=True)
+
+
 @contextmanager
 def plain_lines(takes: Sequence[float] | None = None) -> Iterator[Callable[[str], None]]:
     """The same in lines, told at their times however long a step takes; without what they take where nobody knows how many there will be."""

@@ -15,7 +15,7 @@ from thermospindle.model.rotor.elements import ELEMENTS, LINEAR, REDUCED
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import NM, RPM
 from thermospindle.report.folder import mark, whole_folder
-from thermospindle.report.progress import progress_bar
+from thermospindle.report.progress import hint, progress_bar
 from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
@@ -29,7 +29,7 @@ from thermospindle.report.verbs.answer import (
 from thermospindle.sim.campaign.campaign import write_campaign
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import of_scene
-from thermospindle.sim.hammer.test import stages
+from thermospindle.sim.hammer.test import stages, takes_long
 from thermospindle.sim.operating import doubts_of_modes, operating_point
 from thermospindle.sim.run import Run
 from thermospindle.sim.run import run as whole_chain
@@ -53,6 +53,7 @@ def run(
     out = Path("out") / load(scene).name if out is None else out
     spindle = with_hammer(with_effects(scene, effect_files)[0], hits, level)
     steps = temperatures_or_range(temperatures, spindle)
+    _hint(spindle, steps, element)
     with whole_folder(out) as folder, progress_bar(2 * len(steps) + stages(spindle.hammer, len(steps)) + 4) as progress:
         result = whole_chain(spindle, steps, speed_rpm * RPM, element, seed, progress)
         text.write_run(result, folder, progress)
@@ -164,8 +165,14 @@ def report(
 
 
 def _virtual_tests(spindle: Spindle, temperatures: Sequence[float], speed_rpm: float, element: str | None, seed: int) -> Run:
+    _hint(spindle, temperatures, element)
     with progress_bar(2 * len(temperatures) + stages(spindle.hammer, len(temperatures))) as progress:
         return whole_chain(spindle, temperatures, speed_rpm * RPM, element, seed, progress)
+
+
+def _hint(spindle: Spindle, temperatures: Sequence[float], element: str | None) -> None:
+    if words := takes_long(spindle, element, len(temperatures)):
+        hint(words)
 
 
 def _refuse_rattling(spindle: Spindle, conditions: Sequence[Condition]) -> None:

@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import HammerTest
+from thermospindle.model.machine import HammerTest, Spindle
 from thermospindle.model.parallel import cores
 from thermospindle.model.rotor.elements import LINEAR, REDUCED
 from thermospindle.model.rotor.modes import LARGE
@@ -36,6 +36,7 @@ from thermospindle.sim.side_by_side import SideBySide
 T = TypeVar("T")
 
 MOST_STEPS = 5_000_000  # of one record: a minute of a large model
+LONG = 1.5e8  # steps times degrees of freedom, of all hits together: a minute of one core
 TERMS = 32  # of the anti-alias filter, a sampling interval: closed from 0.6 of the sampling rate on, whose alias is the highest line of a band
 
 
@@ -106,6 +107,16 @@ def impact_tests(
 def usual(test: HammerTest) -> str:
     """The element of a hammer test for which none is asked: linear; reduced where the steps of a record are more than can be computed, of beams whose stiffest mode is far above the band."""
     return LINEAR if sampling(test)[1] <= MOST_STEPS else REDUCED
+
+
+def takes_long(spindle: Spindle, element: str | None, temperatures: int) -> str:
+    """What is said before hammer tests at so many temperatures whose linear model takes MuJoCo more than a minute, as those of many beam elements do; empty where it does not, and of other elements."""
+    test = spindle.hammer
+    _, steps = sampling(test)
+    dofs, hits = sum(len(b.moves) for b in spindle.structure.bodies), test.hits * len(test.hammer_nodes) * temperatures
+    if (element or usual(test)) != LINEAR or steps * dofs * hits < LONG:
+        return ""
+    return f"MuJoCo takes {steps} steps of {dofs} degrees of freedom for each of {hits} hits, which is minutes of work; --element {REDUCED} computes records of the same linear model without it, in seconds"
 
 
 def batched(items: Iterable[T], size: int) -> Iterator[list[T]]:

@@ -9,12 +9,14 @@ from tests.conftest import ROOT
 from tests.sim.hammer.test_impact import error, exact_frf
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.elements import LINEAR, REDUCED
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.report.verbs import chain
 from thermospindle.report.verbs.chain import impact, simulate
 from thermospindle.sim.hammer import test as hammer_test
 from thermospindle.sim.hammer.reduced import IMAGES
-from thermospindle.sim.hammer.test import impact_tests, stages
+from thermospindle.sim.hammer.test import impact_tests, stages, takes_long
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import identify
 
@@ -63,6 +65,20 @@ def test_the_verbs_say_that_the_reduced_model_was_taken(tmp_path):
     beam = ROOT / "scenes" / "free_shaft"
     told = [impact(beam), impact(beam, element="reduced"), simulate(beam, temperatures=[20.0], out=tmp_path / "campaign")]
     assert [any("reduced model" in w for w in a.values["warnings"]) for a in told] == [True, False, True]
+
+
+def test_minutes_in_mujoco_are_told_before_them_and_what_takes_seconds(spindle, capsys):
+    """Of the linear model alone: a test of balls has no other way."""
+    beams = load(SCENES / "five_bearing")
+    said = takes_long(beams, None, 5)
+    assert said == takes_long(beams, LINEAR, 5)
+    assert "of 125 degrees of freedom for each of 20 hits" in said
+    assert "--element reduced" in said
+    for of, element, temperatures in ((beams, None, 1), (beams, REDUCED, 5), (beams, "ball-by-ball", 5), (spindle, None, 5), (load(SCENES / "free_shaft"), None, 5)):
+        assert takes_long(of, element, temperatures) == ""
+    chain._hint(beams, [20.0] * 5, None)
+    chain._hint(spindle, [20.0] * 5, None)
+    assert capsys.readouterr() == ("", f"spindle: hint: {said}\n")
 
 
 def test_pieces_of_a_record_are_one_record(spindle, monkeypatch):
