@@ -1,4 +1,4 @@
-"""What several modules of tests here look at: a diagnosis and its answer, benches and a page of the workbench."""
+"""What several modules of tests here look at: a diagnosis and its answer, a comparison, benches and a page of the workbench."""
 
 import signal
 from dataclasses import replace
@@ -10,6 +10,7 @@ from bokeh.document import Document
 from tests.conftest import SCENE
 from tests.report.served import started
 from tests.report.workbench_session import CAMPAIGN
+from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
@@ -17,12 +18,18 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.model.machine import Condition
+from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.workbench import bench as benches
 from thermospindle.report.workbench import state
 from thermospindle.report.workbench.page import Page
 from thermospindle.report.workbench.state import Setting
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.effects import by_name
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.operating import operating_point
+
+LINES = np.arange(400.0, 6000.0, 4.0)
 
 
 @pytest.fixture(scope="session")
@@ -39,6 +46,31 @@ def told(nothing_missing):
     verdict = replace(nothing_missing.verdict, word="identified", effects=("soak_lag",), candidates=(best,), accepted=hypothesis)
     found = replace(nothing_missing, verdict=verdict, tests=(test,))
     return found, diagnosis_json(found) | {"campaign": "lag & <haste>"}
+
+
+@pytest.fixture(scope="session")
+def low(spindle):
+    """The model's own FRFs with every frequency 1 % low, cold and hot."""
+    tests = []
+    for t, speed in ((20.0, 0.0), (60.0, 754.0)):
+        value = operating_point(spindle, Condition(t, speed)).frf(LINES * 1.01)
+        sd = 0.003 * np.abs(value) + 2e-4 * np.abs(value).max()
+        error = sd * np.random.default_rng(1).standard_normal((2, *value.shape)) / np.sqrt(2)
+        frf = Frf(LINES, value + error[0] + 1j * error[1], tuple(p.node for p in spindle.points), (1, 2), "mobility", sd=sd)
+        tests.append(Test(f"T{t:g}", t, speed, frf=frf))
+    return Campaign("1 % low & <slow>", spindle.name, "mobility", spindle.points, tuple(tests), Noise(0.003, 2e-4))
+
+
+@pytest.fixture(scope="session")
+def compared(spindle, low):
+    return compare(spindle, low)
+
+
+@pytest.fixture(scope="session")
+def compared_folder(spindle, compared, tmp_path_factory):
+    path = tmp_path_factory.mktemp("comparison")
+    write_comparison(compared, spindle, path, name="campA")
+    return path
 
 
 @pytest.fixture(scope="module")

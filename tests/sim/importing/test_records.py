@@ -1,137 +1,21 @@
-"""Raw hammer records: hits found and judged, and FRFs as the exact answer of the model that made them."""
+"""Raw hammer records: their channels, directions, signs and bands, and FRFs as the exact answer of the model that made them."""
 
 from __future__ import annotations
-
-import re
 
 import numpy as np
 import pytest
 
 from tests.conftest import SCENE
+from tests.sim.importing.recorded import MAPPING, RATE, exact, hit
 from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
-from thermospindle.sim.hammer.pulse import PRE_TRIGGER
-from thermospindle.sim.importing.mapping import RecordForm
-from thermospindle.sim.importing.measured import End
-from thermospindle.sim.importing.records.hits import Hit, fault, limits_of
 from thermospindle.sim.importing.records.windows import end_needed
 
-RATE, LENGTH = 8192.0, 1.0
-POLES = 2 * np.pi * np.array([210.0, 640.0]), np.array([0.01, 0.008])
-SHAPES = np.array([[1.0, 0.6], [0.7, -0.9]])  # (points, modes), kg^-1/2
-MAPPING = """
-spindle = "rig"
-[[files]]
-file = "hammer*"
-test = "T20"
-[[tests]]
-id = "T20"
-temperature_C = 20.0
-speed_rpm = 0.0
-[[points]]
-node = 1
-name = "a"
-body = "b"
-position_mm = [0.0, 0.0, 0.0]
-direction = "+Z"
-[[points]]
-node = 2
-name = "c"
-body = "b"
-position_mm = [1.0, 0.0, 0.0]
-direction = "+Z"
-"""
 
-
-def exact(frequency, decay=0.0):
-    """Mobility (2, 2, n) at i w + decay."""
-    s = 2j * np.pi * frequency + decay
-    w, z = POLES
-    return np.einsum("rm,qm,mn->rqn", SHAPES, SHAPES, s / (s**2 + 2 * (z * w)[:, None] * s + w[:, None] ** 2))
-
-
-def hit(random, doubled=False, power=0):
-    """Force (n,) of one hit of 0.6 ms at 50 ms, and the velocities (2, n) it makes, by discrete convolution with the exact impulse response;
-    accelerations for `power` 1."""
-    n, start = round(RATE * LENGTH), round(0.05 * RATE)
-    t = np.arange(n) / RATE
-    width = 6e-4 * random.uniform(0.9, 1.1)
-    peak = random.uniform(60, 100)
-    force = peak * np.where((t > t[start]) & (t < t[start] + width), np.sin(np.pi * (t - t[start]) / width), 0.0)
-    if doubled:
-        force += 0.4 * np.roll(force, round(0.01 * RATE))
-    w, z = POLES
-    damped = w * np.sqrt(1 - z**2)
-    padded = np.fft.rfftfreq(4 * n, 1 / RATE)
-    del damped
-    shift = 12.0  # evaluated off the axis, so that the answer has died away within the padded record
-    answer = np.fft.irfft(np.fft.rfft(force * np.exp(-shift * t), 4 * n) * exact(padded, shift) * (2j * np.pi * padded + shift) ** power, 4 * n)[..., :n] * np.exp(shift * t)
-    return force, answer  # (n,), (2 responses, 2 references, n)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Six hits on each point, one record a point; of point 1 the second hit is double and the third is clipped."""
-    folder = tmp_path_factory.mktemp("records")
-    random = np.random.default_rng(3)
-    for q in (0, 1):
-        forces, answers = [], []
-        for k in range(6):
-            force, answer = hit(random, doubled=q == 0 and k == 1)
-            own = 1e3 * answer[:, q] + 2e-3 * random.standard_normal((2, len(force)))
-            if q == 0 and k == 2:
-                own[1] = np.clip(own[1], -0.6 * own[1].max(), 0.6 * own[1].max())
-            forces.append(force + 0.01 * random.standard_normal(len(force)))
-            answers.append(own)
-        force, answer = np.concatenate(forces), np.concatenate(answers, axis=1)
-        head = f"Time [s],force {q + 1} [N],velocity 1 [mm/s],velocity 2 [mm/s]"
-        np.savetxt(folder / f"hammer{q + 1}.csv", np.c_[np.arange(len(force)) / RATE, force, answer.T], delimiter=",", header=head, comments="", fmt="%.9g")
-    return folder
-
-
-@pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])
-def test_hits_are_found_judged_and_averaged(folder, tmp_path, estimator):
-    (tmp_path / "m.toml").write_text(MAPPING + f'[records]\nestimator = "{estimator}"\nband_Hz = [50.0, 1000.0]\n')
-    answer = bring([folder / "hammer1.csv", folder / "hammer2.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
-    notes = "\n".join(answer.values["notes"])
-    assert "hammer1.csv: hit 2: left out, double hit: 40% of the first pulse, 10 ms after it" in notes
-    assert "hammer1.csv: hit 3: left out, overload" in notes
-    assert "4 of 6 hits" in notes
-    assert "6 of 6 hits" in notes
-    test = read_campaign(tmp_path / "c").tests[0]
-    frf = test.frf
-    model = exact(frf.frequency, test.window_decay)
-    assert np.abs(frf.value - model).max() < 3e-3 * np.abs(model).max()
-    assert np.median(frf.coherence) > 0.98
-    assert test.window_decay > 1
-    assert test.pretrigger == pytest.approx(PRE_TRIGGER + 3e-4 + 0.5 / RATE, abs=1.5 / RATE)  # to the middle of a hit of 0.6 ms
-    if estimator == "H1":  # what standard errors say comes true, within the bias of a force cut to its window
-        ratio = np.abs(frf.value - model) / frf.sd
-        assert 0.4 < np.sqrt(np.mean(ratio**2)) < 3
-
-
-def test_hits_that_are_not_of_one_length_are_asked_about_where_the_form_can_be_answered(folder, tmp_path):
-    """The answer was said to be open in a form that had no line for it; what is proposed is long enough for no hit to be lost, and as long as all of them are."""
-    head, *rows = (folder / "hammer2.csv").read_text().splitlines()
-    n, short = round(RATE * LENGTH), 6500
-    kept = [row for k in range(6) for row in rows[k * n : k * n + short]]
-    (tmp_path / "T20_n0_hammer1.csv").write_text((folder / "hammer1.csv").read_text())
-    (tmp_path / "T20_n0_hammer2.csv").write_text("\n".join([head, *(f"{k / RATE:.9g},{row.partition(',')[2]}" for k, row in enumerate(kept))]) + "\n")
-    files, form = [tmp_path / f"T20_n0_hammer{q}.csv" for q in (1, 2)], tmp_path / "form.toml"
-    bring(files, mapping=form)
-    line = next(row for row in form.read_text().splitlines() if row.startswith('hit_length_s = "?"'))
-    longest = re.search(r"one length for all hits, so that one window fits all its FRFs; at most ([\d.]+), which all of them have", line)[1]
-    assert 0.9 * short / RATE < float(longest) <= short / RATE  # what follows the last hit is shorter than a gap
-    (tmp_path / "m.toml").write_text(MAPPING.replace("hammer*", "*") + form.read_text()[form.read_text().index("[records]") :].replace('"?"', longest))
-    notes = "\n".join(bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"])
-    assert "4 of 6 hits" in notes
-    assert "6 of 6 hits" in notes
-
-
-def test_force_and_response_exchanged_are_said_to_be(folder, tmp_path):
+def test_force_and_response_exchanged_are_said_to_be(hammered, tmp_path):
     """What rings on was told to be the force: each hit seemed to be a double one. With the columns told it is read as ever."""
-    text = (folder / "hammer2.csv").read_text()
+    text = (hammered / "hammer2.csv").read_text()
     (tmp_path / "hammer2.csv").write_text(text.replace("force 2 [N],velocity 1 [mm/s]", "velocity 1 [mm/s],force 2 [N]", 1))
     (tmp_path / "m.toml").write_text(MAPPING)
     said = r"hammer2.csv: columns: whether force and response are exchanged: its force 'force 2 \[N\]' rings on, and its response 'velocity 1 \[mm/s\]' is a pulse"
@@ -143,8 +27,8 @@ def test_force_and_response_exchanged_are_said_to_be(folder, tmp_path):
     bring([tmp_path / "hammer2.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
 
 
-def test_a_dead_channel_is_one_sentence_and_can_be_left_out(folder, tmp_path, recwarn):
-    rows = np.loadtxt(folder / "hammer1.csv", delimiter=",", skiprows=1)
+def test_a_dead_channel_is_one_sentence_and_can_be_left_out(hammered, tmp_path, recwarn):
+    rows = np.loadtxt(hammered / "hammer1.csv", delimiter=",", skiprows=1)
     rows[:, 3] = 0.0
     head = "Time [s],force 1 [N],velocity 1 [mm/s],velocity 2 [mm/s]"
     np.savetxt(tmp_path / "hammer1.csv", rows, delimiter=",", header=head, comments="", fmt="%.9g")
@@ -166,22 +50,22 @@ def test_a_dead_channel_is_one_sentence_and_can_be_left_out(folder, tmp_path, re
     ("heading", "told", "turned"),
     [("velocity 2 [mm/s]", "", 1), ("velocity 2:-Z [mm/s]", "", -1), ("velocity 2 [mm/s]", 'columns = { "velocity 2 [mm/s]" = "velocity 2:-Z [mm/s]" }', -1)],
 )
-def test_a_sensor_that_looks_the_other_way_is_turned(folder, tmp_path, heading, told, turned):
+def test_a_sensor_that_looks_the_other_way_is_turned(hammered, tmp_path, heading, told, turned):
     """The direction of a column of a time record counts, as that of an FRF does."""
-    text = (folder / "hammer1.csv").read_text()
+    text = (hammered / "hammer1.csv").read_text()
     (tmp_path / "hammer1.csv").write_text(text.replace("velocity 2 [mm/s]", heading, 1))
     (tmp_path / "m.toml").write_text(MAPPING.replace('test = "T20"', f'test = "T20"\n{told}', 1))
     bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
     (tmp_path / "plain.toml").write_text(MAPPING)
-    bring([folder / "hammer1.csv"], mapping=tmp_path / "plain.toml", out=tmp_path / "d")
+    bring([hammered / "hammer1.csv"], mapping=tmp_path / "plain.toml", out=tmp_path / "d")
     frf, plain = (read_campaign(tmp_path / name).tests[0].frf for name in "cd")
     np.testing.assert_allclose(frf.value[1], turned * plain.value[1])
     np.testing.assert_allclose(frf.value[0], plain.value[0])
 
 
-def test_a_reference_of_the_mapping_turns_the_one_of_the_heading_and_is_no_other(folder, tmp_path):
+def test_a_reference_of_the_mapping_turns_the_one_of_the_heading_and_is_no_other(hammered, tmp_path):
     """A force sensor that reads pressure as negative; and a point that no heading tells is refused, where it was not used before, without a word."""
-    rows = np.loadtxt(folder / "hammer1.csv", delimiter=",", skiprows=1)
+    rows = np.loadtxt(hammered / "hammer1.csv", delimiter=",", skiprows=1)
     rows[:, 1] *= -1
     np.savetxt(tmp_path / "hammer1.csv", rows, delimiter=",", header="Time [s],force 1 [N],velocity 1 [mm/s],velocity 2 [mm/s]", comments="", fmt="%.9g")
     (tmp_path / "m.toml").write_text(MAPPING)
@@ -215,19 +99,6 @@ def test_time_records_of_a_uff_file(tmp_path):
     test = read_campaign(tmp_path / "c").tests[0]
     model = exact(test.frf.frequency, test.window_decay)[:, :1]
     assert np.abs(test.frf.value - model).max() < 2e-3 * np.abs(model).max()
-
-
-def test_a_hit_a_row_and_no_hit(tmp_path):
-    random = np.random.default_rng(5)
-    force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
-    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force), velocity1=np.array(answer)[:, 0, 0], velocity2=np.array(answer)[:, 1, 0])
-    told = MAPPING.replace('test = "T20"', 'test = "T20"\nreference = 1\ncolumns = { force = "force [N]", velocity1 = "velocity 1 [m/s]", velocity2 = "velocity 2 [m/s]" }', 1)
-    (tmp_path / "m.toml").write_text(told + "[records]\nband_Hz = [50.0, 1000.0]\n")
-    answer = bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
-    assert "4 of 4 hits" in "\n".join(answer.values["notes"])
-    test = read_campaign(tmp_path / "c").tests[0]
-    model = exact(test.frf.frequency, test.window_decay)[:, :1]
-    assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
 
 
 @pytest.mark.parametrize(("of_force", "of_answer", "struck"), [(-1, -1, "1"), (1, -1, "1"), (-1, 1, "1"), (-1, 1, "1:-Z")])
@@ -353,43 +224,6 @@ def test_all_channels_in_one_array(tmp_path, order):
     np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force)[:3], velocity=motion, resp_nodes=np.array([1, 2]))
     with pytest.raises(BadInput, match="its force force 3 of"):
         bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
-
-
-def recorded(sizes, limit=np.inf, quantum=0.0):
-    """Hits of one record whose response rings from these sizes on, cut off at the limit of its channel and in steps of `quantum`."""
-    random, t = np.random.default_rng(8), np.arange(4000) / RATE
-    force = np.where(t < 1e-3, np.sin(np.pi * t / 1e-3), 0.0) + 1e-3 * random.standard_normal(len(t))
-    hits = []
-    for k, size in enumerate(sizes, 1):
-        ringing = np.exp(-20 * t) * np.cos(2 * np.pi * 800 * t) * (1 + 1e-4 * random.standard_normal(len(t)))
-        value = np.clip(size * ringing / np.abs(ringing).max(), -limit, limit)
-        value = quantum * np.round(value / quantum) if quantum else value
-        hits.append(Hit(f"a.csv: hit {k}", force, 1.0, value[None], value[None]))
-    return hits
-
-
-@pytest.mark.parametrize(
-    ("sizes", "limit", "quantum", "left_out"),
-    [
-        ((1.001, 1.0005, 2.0, 0.8), 1.0, 0.0, [1, 2, 3]),  # the limit is where the third stands
-        ((1.001, 1.0005, 0.8), 1.0, 0.0, []),  # it stands nowhere: two largest values that are the same
-        ((1.001, 1.0005, 1.002), np.inf, 0.01, []),  # alike in coarse steps alone
-    ],
-)
-def test_a_limit_that_one_hit_tells_holds_for_all_of_its_record(sizes, limit, quantum, left_out):
-    """Those that reached it once were kept beside one that was cut off, and FRFs were 7 % wrong."""
-    hits = recorded(sizes, limit, quantum)
-    limits = limits_of(hits)
-    said = {k: why for k, h in enumerate(hits, 1) if (why := fault(h, [End(1)], 1 / RATE, RecordForm(), limits))}
-    assert [*said] == left_out
-    if left_out:
-        assert re.fullmatch(r"overload: response 1 reaches -?1, the limit at which hit 3 stands \d+ times", said[1])
-
-
-def test_what_another_hit_exceeds_is_no_limit_of_the_record():
-    hits = [*recorded((1.001, 2.0), 1.0), *recorded((1.5,))]
-    assert limits_of(hits) == [None, None]
-    assert [fault(h, [End(1)], 1 / RATE, RecordForm(), limits_of(hits)) is None for h in hits] == [True, False, True]
 
 
 def test_a_window_is_for_what_rings_and_not_for_noise():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.sim.importing.exported import set_58, set_164
-from tests.sim.importing.test_records import LENGTH, MAPPING, RATE, exact, hit
+from tests.sim.importing.recorded import LENGTH, MAPPING, RATE, exact, hit
 from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
