@@ -6,7 +6,8 @@ module      what it is
 `laws`      random laws over temperature and speed
 `hidden`    a mechanism times such a law; `hidden_bearings`, `hidden_structure`, `hidden_measuring` and all of them in
             `mechanisms`, written without a look at the catalogue; right answers by name
-`world`     one condition by another program: another mesh, solver and structure, constant errors of modes
+`departures` masses and modes otherwise than drawn, alike in all tests
+`world`     one condition by another program: another mesh, solver and structure
 `campaigns` a campaign of it: drifting gains, noise in lines or time
 `visible`   how visible what is hidden is
 `study`     `python -m tests.blind.study --seeds A B [--out FILE]`: makes, diagnoses and keeps, a line of JSON a seed

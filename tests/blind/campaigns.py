@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from tests.blind.departures import ways_of_mass
 from tests.blind.hidden import Hidden
 from tests.blind.laws import REFERENCE
-from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_read, points_struck, ways_of_mass
+from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_read, points_struck
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, HammerTest, Spindle
 from thermospindle.model.types import Array

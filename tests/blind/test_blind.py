@@ -7,11 +7,12 @@ import pytest
 
 from tests.blind.alike import left, right, right_names
 from tests.blind.campaigns import HAMMERS_FROM, MASSES_FROM, SENSORS_FROM, campaign, further, glued, in_contact, measured
+from tests.blind.departures import ways_of_mass
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
 from tests.blind.visible import change, seen, visibility, visibility_beside
-from tests.blind.world import Record, World, answer, ways_of_mass
+from tests.blind.world import Record, World, answer
 from tests.conftest import ROOT
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition

@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from tests.blind.campaigns import BY_HAND, Made, beside, error_of_hits, faces_struck, glued
+from tests.blind.departures import modal_errors
 from tests.blind.hidden import Hidden
-from tests.blind.world import World, answer, modal_errors, points_struck
+from tests.blind.world import World, answer, drawn_matrices, points_struck
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
@@ -192,7 +193,7 @@ def _modal_columns(made: Made, column, frequency: Array, plain: World, spindle: 
     answers = [answer(made.built, Condition(p.temperature, p.speed), plain) for p in made.plans]
     plainly = [at.frf(frequency) for at in answers]
     found = []
-    for kind, v in enumerate(modal_errors(spindle, made.world)[:2]):
+    for kind, v in enumerate(modal_errors(drawn_matrices(spindle, made.world), spindle, (made.world.stiffness_error, made.world.damping_error))[:2]):
         v = v[:, np.abs(v).max(axis=0) > 1e-9 * np.abs(v).max()]  # not a rigid motion, which has neither stiffness nor damping
         v = np.pad(v, ((0, len(answers[0].linear.mass) - len(v)), (0, 0)))  # a weak mode comes after the drawing's
         one, two = np.triu_indices(v.shape[1], 1)
