@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.model.errors import listed
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.report.text.grid import show_grid
@@ -163,6 +164,15 @@ def _on_the_way(warmup: Warmup) -> list[str]:
     return said
 
 
+def _shifts(warmup: Warmup) -> str:
+    """By what each mode has moved in the steady state, and which none there has the shape of."""
+    shift = warmup.steady_frequencies - warmup.frequencies[0]
+    moved = [f"mode {k} ({escape(m.kind)}) {by:+z.1f}" for k, (m, by) in enumerate(zip(warmup.modes, shift, strict=True), 1) if np.isfinite(by)]
+    lost = [f"{k} ({escape(m.kind)})" for k, (m, by) in enumerate(zip(warmup.modes, shift, strict=True), 1) if not np.isfinite(by)]
+    said = [f"natural frequencies move by {', '.join(moved)} Hz"] if moved else []
+    return ", and ".join([*said, f"no mode there has the shape of mode{'s' * (len(lost) > 1)} {listed(lost)}"] if lost else said)
+
+
 def furthest_mode(warmup: Warmup) -> tuple[int, int] | None:
     """Moment and mode, from 0, of the largest change of a natural frequency since the start; the steady state counts as the last moment. None without modes."""
     every = _frequencies(warmup)
@@ -246,17 +256,13 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
     bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
     first = first_row(warmup)
     pressed = "" if first is None else f", the preload of {escape(first)} is {last.preload[first]:.2f} N (at the start {warmup.moments[0].preload[first]:.2f} N)"
-    shifts = ", ".join(
-        f"mode {k} ({escape(m.kind)}) {b - a:+z.1f}"
-        for k, (m, a, b) in enumerate(zip(warmup.modes, warmup.frequencies[0], warmup.steady_frequencies, strict=True), 1)
-    )
     unit, scale = power(most_friction(warmup))
     clear = {name: rollers(warmup, name)["clearance_um"][0] for name in roller_names(warmup)}
     fits = "".join(f", the clearance of the rollers of {escape(b)} {1e6 * clearance(last, b):.1f} µm (at the start {c:.1f} µm)" for b, c in clear.items())
     about = (
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
         f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C{pressed}{fits} and bearing friction is "
-        f"{scale * sum(last.friction.values()):.0f} {unit}; natural frequencies move by {shifts} Hz.</p>"
+        f"{scale * sum(last.friction.values()):.0f} {unit}; {_shifts(warmup)}.</p>"
         f"{''.join(f'<p>{escape(said)}</p>' for said in _on_the_way(warmup))}"
         f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']}; "
         f"stored {total['stored']}.</p>"

@@ -145,6 +145,9 @@ def test_modes_of_bearings_that_lose_contact_end(spindle, coarse):
     kinds = _followed_kinds(found)
     assert 0 < len(kinds) < len(found.modes)
     assert all((a == "axial") == (b == "axial") for a, b in kinds)
+    _, told = warmup_section(found)
+    assert "and no mode there has the shape of modes 1 (axial), " in told.replace("\u00a0", " ")
+    assert "nan" not in told.partition("<figure")[0]
 
 
 def test_energy_is_conserved_at_every_step(warm):
