@@ -44,16 +44,18 @@ def frequency_shift(scene: str | Path | Spindle, mode: int, from_C: float, to_C:
     """
     spindle = scene if isinstance(scene, Spindle) else load(scene)
     speed = speed_rpm * RPM
+    own = modes(operating_point(spindle, Condition(from_C, speed)).chain)
+    if not 1 <= mode <= len(own):
+        raise BadInput(f"mode {mode}: {spindle.name} has modes 1 to {len(own)} at {from_C:g} C; they are counted from 1")
 
     def frequencies(s: Spindle, cold: float = from_C, hot: float = to_C) -> Array:
         chains = [operating_point(s, Condition(t, speed)).chain for t in (cold, hot)]
-        ends = [modes(chain) for chain in chains]
-        if not 1 <= mode <= len(ends[0]):
-            raise BadInput(f"mode {mode}: {s.name} has modes 1 to {len(ends[0])} at {cold:g} C; they are counted from 1")
-        partner = follow(matrices(chains[0]).mass, ends[0], ends[1])[mode - 1]
+        ends, mass = [modes(chain) for chain in chains], matrices(chains[0]).mass
+        first = follow(mass, own, ends[0])[mode - 1]  # not the same number where a deviation moves it past another mode
+        partner = follow(mass, ends[0], ends[1])[first] if first >= 0 else -1
         if partner < 0:
-            raise BadInput(f"mode {mode}: {s.name} has it at {cold:g} C and no mode of its shape at {hot:g} C, so it has no shift")
-        return np.array([ends[0][mode - 1].frequency, ends[1][partner].frequency])
+            raise BadInput(f"mode {mode}: {s.name} has it at {from_C:g} C and no mode of its shape at {hot:g} C, so it has no shift")
+        return np.array([ends[0][first].frequency, ends[1][partner].frequency])
 
     start, end = frequencies(spindle)
 
