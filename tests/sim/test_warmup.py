@@ -260,6 +260,16 @@ def test_thermal_runaway_is_told(spindle, coarse):
         warm_up(own, SPEED, 20.0)
 
 
+@pytest.mark.parametrize("start", [10.0, 50.0])
+def test_a_start_beyond_a_law_is_told_with_scene_and_key(spindle, coarse, start):
+    """The law alone was told, without what was asked of it."""
+    thermal = spindle.thermal
+    told = replace(thermal.friction.viscosity, temperature=(20.0, 40.0), value=(63.1e-6, 26e-6))
+    narrow = replace(spindle, thermal=replace(thermal, friction=replace(thermal.friction, viscosity=told)))
+    with pytest.raises(OutsideRange, match=rf"spindle.toml: from {start:g} C .* does not reach: thermal.friction.kinematic_viscosity_mm2_per_s: a law given from 20 to 40 C was asked"):
+        warm_up(narrow, SPEED, start)
+
+
 def test_rigid_rings_that_run_away_on_the_way_are_told(tmp_path):
     """Hot inner rings in a cold housing, rigidly preloaded: time, bearing, load and ring temperatures instead of a law that ends."""
     scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace('preload_kind = "spring" ', 'preload_kind = "rigid" ')
