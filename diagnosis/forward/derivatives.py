@@ -13,8 +13,9 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.linear import Linear, Pairs, Rates, pairs, products, same_chain, together
+from thermospindle.diagnosis.forward.measuring import aside, askew, hammer_gain
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.points import Applied, aside, askew
+from thermospindle.diagnosis.forward.points import Applied
 from thermospindle.diagnosis.forward.response import Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.types import Array, ComplexArray, Integers
@@ -86,7 +87,7 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     for h in np.unique(model.numbers.hammers[t][1]):
         at = fill(at, np.where((model.numbers.hammer_of[t] == h)[:, None], response.value, 0.0)[None])
     missing, struck_by, way = aside(model.operating(t, x, effects)), model.numbers.hammer_of[t], np.unique(model.numbers.misses[t][1])
-    for ref, gain in enumerate(model.hammer_gain(t, x)):
+    for ref, gain in enumerate(hammer_gain(model.numbers, t, x)):
         missed = gain * response.struck(missing[:, ref]) * weight[:, ref][:, None]
         for n in np.flatnonzero(way // 2 == struck_by[ref]):
             jacobian[at + n, :, ref] = missed[:, way[n] % 2].view(float)
@@ -118,7 +119,7 @@ def _each(numbers: Integers) -> Shared:
 
 def _alike(model: CampaignModel, numbers: Integers, of: Integers) -> Shared:
     """Of parameters that move what they are `of`, in proportion to their standard deviations; rows are in its order."""
-    return numbers, np.unique(of, return_inverse=True)[1], model.sd[numbers]
+    return numbers, np.unique(of, return_inverse=True)[1], model.numbers.sd[numbers]
 
 
 def _after_each_other(every: Sequence[Shared]) -> Shared:

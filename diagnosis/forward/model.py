@@ -15,7 +15,8 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward.latest import Latest
 from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_between, mass_changes
-from thermospindle.diagnosis.forward.points import Applied, aside, askew, replace_measuring, undrawn
+from thermospindle.diagnosis.forward.measuring import channel_gain, measured, replace_measuring
+from thermospindle.diagnosis.forward.points import Applied, undrawn
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
@@ -29,7 +30,7 @@ from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.types import Array, ComplexArray, Integers
-from thermospindle.sim.effects.effect import HOOKS, Effect, Measurement, Values
+from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, with_material
 from thermospindle.sim.operating import SETTLING, OperatingPoint, acted_on, equilibrium, operating_point
 
@@ -80,7 +81,7 @@ class CampaignModel:
             for i in self.numbers.coefficients:
                 if x[i]:
                     material = spindle.materials[spindle.used_materials[self.parameters[i].index]]
-                    spindle = with_material(spindle, expanding(material, float(x[i]) * self.sd[i]))
+                    spindle = with_material(spindle, expanding(material, float(x[i]) * self.numbers.sd[i]))
             for i in self.numbers.flung:
                 spindle = replace(spindle, ball_inertia=max(spindle.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
             return spindle
@@ -101,11 +102,6 @@ class CampaignModel:
     def numbers(self) -> Numbers:
         """Which of the parameters are what."""
         return Numbers(self.parameters, self.tests, self.reference)
-
-    @cached_property
-    def sd(self) -> Array:
-        """Prior standard deviations (P,) of the parameters in their own units."""
-        return np.array([p.sd for p in self.parameters])
 
     @cached_property
     def unevennesses(self) -> tuple[Unevenness, ...]:
@@ -189,34 +185,7 @@ class CampaignModel:
         stiffness, damping = self._discrepancy(t, bare, x)
         mass, gyroscopic = self._otherwise_heavy(x, bare.dofs)
         whole = Matrices(bare.mass + mass, bare.damping + damping + point.chain.speed * gyroscopic, bare.stiffness + stiffness, bare.dofs)
-        return Linear(whole, self._measured(t, point, x), point.chain.layout, between)
-
-    def _measured(self, t: int, point: OperatingPoint, x: Array) -> Measurement:
-        """The measuring chain of a point, whose sensors are off their places and directions, and whose hammers miss theirs and have gains of their own."""
-        return self._struck(t, point, self._heard(t, point, x), x)
-
-    def _heard(self, t: int, point: OperatingPoint, x: Array) -> Measurement:
-        (number, which), of, chain = self.numbers.sensors, self.numbers.channel_of[t], point.measurement
-        if not (len(of) and x[number].any()):
-            return chain
-        off = np.bincount(which, x[number] * self.sd[number]).reshape(-1, 4)[of]  # of every sensor, each way
-        rows = chain.response_rows.copy()
-        rows[: len(of)] += np.einsum("rw,wrn->rn", off, askew(point)[:, : len(of)])
-        return changed(chain, response_rows=rows)
-
-    def _struck(self, t: int, point: OperatingPoint, chain: Measurement, x: Array) -> Measurement:
-        (number, which), of = self.numbers.misses[t], self.numbers.hammer_of[t]
-        gain = self.hammer_gain(t, x)
-        if not (len(gain) and (x[number].any() or (gain != 1.0).any())):
-            return chain
-        missed = np.bincount(which, x[number] * self.sd[number], 2 * (of.max() + 1)).reshape(-1, 2)  # of every hammer, either way
-        one, other = aside(point)
-        rows = chain.reference_rows + missed[of, :1] * one + missed[of, 1:] * other
-        return changed(chain, reference_rows=gain[:, None] * rows)
-
-    def hammer_gain(self, t: int, x: Array) -> Array:
-        """Gain (n_ref,) of the hammer of each column of test `t`."""
-        return self._gain(x, *self.numbers.hammers[t], self.numbers.hammer_of[t])
+        return Linear(whole, measured(self.numbers, t, point, x), point.chain.layout, between)
 
     def _otherwise_heavy(self, x: Array, dofs: Dofs) -> tuple[Array, Array]:
         """What bodies that have their mass otherwise than drawn add to M and, per rad/s, to G (n, n)."""
@@ -269,7 +238,7 @@ class CampaignModel:
 
     def _response(self, t: int, x: Array, linear: Linear, data: LineData) -> Response:
         cut = 0.0 if self.numbers.record is None else float(x[self.numbers.record])
-        return Response(linear, data, self._gain(x, *self.numbers.gains[t], self.numbers.channel_of[t]), cut, [light for light, _ in self.lights(t, linear.matrices.dofs, x)])
+        return Response(linear, data, channel_gain(self.numbers, t, x), cut, [light for light, _ in self.lights(t, linear.matrices.dofs, x)])
 
     def lights(self, t: int, dofs: Sequence[tuple[str, str]], x: Array) -> list[tuple[Light, Integers]]:
         """The light resonances of test `t` at nuisance values, over `dofs`, and the numbers of the parameters of each."""
@@ -306,11 +275,6 @@ class CampaignModel:
     def _responses(self) -> Latest[tuple[Linear, Response | Table, Applied]]:
         """With the effects, as long as which are kept no other comes where they are in memory."""
         return Latest(ANSWERS * len(self.tests))
-
-    def _gain(self, x: Array, number: Integers, index: Integers, of: Integers) -> Array:
-        """Gains of rows (or columns) that are `of` these channels (or hammers), which the parameters by `number` are the ln of, one or more for each `index`."""
-        ln = x[number] * self.sd[number]
-        return np.asarray(np.exp((of[:, None] == index) @ ln))
 
     def whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
         """What differs (n_resp, n_ref, L) in standard errors, (N,): the real and the imaginary part of one number after the other."""

@@ -1,9 +1,8 @@
-"""Operating points that differ in little from those that are there: in the measuring chain, in how far the rings expand, in how bearings differ, or joints about the axis."""
+"""Operating points that differ in little from those that are there: in how far the rings expand, in how bearings differ, or joints about the axis."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
 
 import numpy as np
 
@@ -13,61 +12,12 @@ from thermospindle.diagnosis.parameters.nuisance import DIRECTIONS, RANGE_K, Nui
 from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.changed import changed
-from thermospindle.model.machine import Condition, Point, RingMotion, Spindle
-from thermospindle.model.rotor.chain import Layout, RotorBase, row_of
+from thermospindle.model.machine import Condition, RingMotion, Spindle
+from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.model.types import Array, Integers
 from thermospindle.sim.effects.effect import Effect, Values
-from thermospindle.sim.effects.measuring.hammer_position import off
-from thermospindle.sim.operating import OperatingPoint
 
 Applied = Sequence[tuple[Effect, Values]]
-STEP = 1e-4  # m
-
-
-def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint:
-    """The same point under another list of effects that differs in the measuring chain alone; its chain and matrices are kept."""
-    if tuple(effects) == point.effects:
-        return point
-    other = changed(point, effects=tuple(effects))
-    other.__dict__["chain"] = point.chain
-    if "_bare" in point.__dict__:
-        other.__dict__["_bare"] = point.__dict__["_bare"]
-    return other
-
-
-def aside(point: OperatingPoint) -> Array:
-    """How the rows of its hammers change a metre beside their points, the two ways on the face that is struck (2, n_ref, n)."""
-    return _aside(point.chain.layout, tuple(point.spindle.point(node) for node in point.spindle.hammer.hammer_nodes))
-
-
-def askew(point: OperatingPoint) -> Array:
-    """How the rows of its points change a metre beside their places, the two ways on the face they lie on, and a radian out of their directions towards these (4, points, n)."""
-    return _askew(point.chain.layout, point.spindle.points)
-
-
-WAYS = 0.0, np.pi / 2  # on a face
-
-
-@lru_cache(maxsize=256)
-def _aside(layout: Layout, aimed: tuple[Point, ...]) -> Array:
-    found = np.array([[row_of(layout, off(p, STEP, way)) - row_of(layout, p) for p in aimed] for way in WAYS]) / STEP
-    found.flags.writeable = False
-    return found
-
-
-@lru_cache(maxsize=256)
-def _askew(layout: Layout, sensors: tuple[Point, ...]) -> Array:
-    turned = np.array([[row_of(layout, changed(p, direction=_towards(p, way))) for p in sensors] for way in WAYS])
-    found = np.concatenate([_aside(layout, sensors), turned])
-    found.flags.writeable = False
-    return found
-
-
-def _towards(p: Point, way: float) -> tuple[float, float, float]:
-    """The unit vector of a `way` on the face that a point lies on."""
-    x, y, z = np.subtract(off(p, 1.0, way).position, p.position)
-    return float(x), float(y), float(z)
-
 
 Told = Sequence[tuple[Nuisance, float]]
 """Parameters with how much they are, in their own units."""

@@ -32,6 +32,11 @@ class Numbers:
         kinds = [p.kind for p in self.parameters]
         return {kind: np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)}
 
+    @cached_property
+    def sd(self) -> Array:
+        """Prior standard deviations (P,) of the parameters in their own units."""
+        return np.array([p.sd for p in self.parameters])
+
     def _of(self, *kinds: str) -> Integers:
         return np.sort(np.concatenate([self.of_kind.get(kind, np.zeros(0, int)) for kind in kinds]))
 

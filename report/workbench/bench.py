@@ -248,7 +248,8 @@ def _changes(bench: Bench, s: Setting, shown: Shown) -> tuple[list[Cell], str]:
              f"{m.frequency:.1f} Hz as opened, {then[j].frequency:.1f} Hz now")
         for (k, m), j in zip(own.items(), partner, strict=True) if j >= 0
     ]  # fmt: skip
-    gone = [f"mode {k}, {'not here' if k not in own else f'{own[k].frequency:.0f} Hz as opened'}" for k in named if k not in {int(c.mode.split()[0]) for c in cells}]
+    kept = {k for k, j in zip(own, partner, strict=True) if j >= 0}
+    gone = [f"mode {k}, {f'{own[k].frequency:.0f} Hz as opened' if k in own else 'not here'}" for k in named if k not in kept]
     return cells, f"{shown.id}: no mode has the shape of {'; '.join(gone)}" if gone else ""
 
 
