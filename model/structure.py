@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from thermospindle.model.shaft import Shaft
@@ -39,6 +39,11 @@ class Joint:
     role: str = ""  # mount, plate or flange: what effects know it by; empty for none of these
     material: str = ""  # whose elastic modulus its stiffness follows; empty for none
     loss_factor: float = 0.0  # the same at all frequencies, beside damping_ratio (`model.rotor.loss`)
+
+    def stiffer(self, factor: float, tilt: float) -> Joint:
+        """With its stiffness multiplied, and that against tilt by `tilt`."""
+        x, y, z, tilt_x, tilt_y = self.stiffness
+        return replace(self, stiffness=(factor * x, factor * y, factor * z, tilt * tilt_x, tilt * tilt_y))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ condition's; those that prescribe region temperatures are left out whole, since 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,12 +140,13 @@ def warm_up(
     except heat.NotSettled as error:
         raise heat.NotSettled(f"{where} the bearings run away: {error}; {REMEDY}") from None
     except OutsideRange as error:
-        began = None
         if speed and not isinstance(error, heat.RanAway):  # too hot under the loads of the start, which says nothing of what becomes of them
-            with suppress(OutsideRange):  # of the start itself
-                began = heat.slowest(model, model.field(model.nodal(start)), drive(0.0, model.nodal(start)))
-        if began is not None:
-            marched(TIME_CONSTANTS * began)
+            try:
+                constant = heat.slowest(model, model.field(model.nodal(start)), drive(0.0, model.nodal(start)))
+            except OutsideRange:
+                pass  # it is the start itself
+            else:
+                marched(TIME_CONSTANTS * constant)
         raise type(error)(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; {REMEDY}") from None
     final = model.nodal(field)
     constant = heat.slowest(model, field, drive(0.0, final))

@@ -83,8 +83,7 @@ def at_temperature(structure: Structure, materials: Mapping[str, Material], refe
                 changed[before.name] = _scaled(joints[before.name], before, after)
     for joint in structure.joints:
         if joint.material and (ratio := materials[joint.material].youngs_modulus(temperature) / materials[joint.material].youngs_modulus(reference)) != 1.0:
-            x, y, z, tilt_x, tilt_y = (ratio * k for k in joint.stiffness)
-            changed[joint.name] = replace(joint, stiffness=(x, y, z, tilt_x, tilt_y))
+            changed[joint.name] = joint.stiffer(ratio, ratio)
     return replace(structure, joints=tuple(changed.get(j.name, j) for j in structure.joints)) if changed else structure
 
 

@@ -10,10 +10,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from thermospindle.model.errors import BadInput, absent
+from thermospindle.model.errors import BadInput
 from thermospindle.model.files import stiffness_table
 from thermospindle.model.files.cells import plain_number
-from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table, meant
+from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table, meant, named
 from thermospindle.model.units import RPM
 
 Row = Annotated[tuple[Finite, Finite, Finite, Finite, Finite], Strict(False)]
@@ -62,13 +62,10 @@ class Numbers(Table):
             raise ValueError("bearing names the rows of a table; without table there are none")
         return self
 
-    def grid(self, folder: Path, table_key: str = "table") -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-        """Temperatures (C), speeds (rad/s) and stiffness (temperatures, speeds, 5, 5), flat; `table_key` is what a refusal calls the key of a table's file."""
+    def grid(self, scene: Path, table_key: str) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+        """Temperatures (C), speeds (rad/s) and stiffness (temperatures, speeds, 5, 5), flat; `table_key` is the key of a table's file in the file of the `scene`."""
         if self.table is not None:
-            file, key = folder / self.table, f"{table_key} = {self.table!r}"
-            if not file.is_file():  # a pipe would be waited for, a device has no end
-                raise BadInput(f"{key}: {file}: {absent(file)}; allowed is a CSV file, told from the folder of the scene")
-            return _read(file, self.bearing, key)
+            return _read(named(scene, table_key, self.table, "CSV file", "scene"), self.bearing, f"{scene}: {table_key} = {self.table!r}")
         if self.matrix_SI is not None:
             k = np.array(self.matrix_SI)
         else:

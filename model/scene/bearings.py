@@ -208,7 +208,7 @@ class Bearing(Table):
     def linear(self, name: str, inner_body: str, outer_body: str, file: Path) -> m.LinearBearing:
         """The bearing given by numbers; a table is read from the folder of the scene's `file`."""
         assert self.numbers is not None
-        temperature, speed, stiffness = self.numbers.grid(file.parent, f"{file}: bearings.{name}.numbers.table")
+        temperature, speed, stiffness = self.numbers.grid(file, f"bearings.{name}.numbers.table")
         return m.LinearBearing(
             name, self.z_mm * MM, inner_body, outer_body, temperature, speed, stiffness, self.numbers.damping_ratio
         )

@@ -145,6 +145,14 @@ def values_within(low: float, high: float) -> AfterValidator:
     return AfterValidator(check)
 
 
+def named(file: Path, key: str, name: str, kind: str, owner: str) -> Path:
+    """The file of a `kind` that a key of an `owner`'s file names, from its folder. Raises `BadInput` where there is none."""
+    there = file.parent / name
+    if not there.is_file():  # a pipe would be waited for, a device has no end
+        raise BadInput(f"{file}: {key} = {name!r}: {there}: {absent(there)}; allowed is a {kind}, told from the folder of the {owner}")
+    return there
+
+
 def read_toml(file: Path) -> dict[str, Any]:
     """The tables of a TOML file; `BadInput` for what is none, or is written so that it cannot be read."""
     if not file.is_file():  # a pipe would be waited for

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
@@ -142,8 +142,8 @@ def chosen_step(spindle: Spindle) -> float:
 
 def content_hash(spindle: Spindle) -> str:
     """Twelve hex digits that change when any number of the spindle changes (name, file and provenance apart)."""
-    content = asdict(spindle)
-    for key in ("name", "title", "file", "provenance"):
+    content = _compared(spindle)
+    for key in ("name", "title", "provenance"):
         content.pop(key)
     if not any(content["radial_load"]):  # what came later counts where there is any
         content.pop("radial_load")
@@ -151,11 +151,6 @@ def content_hash(spindle: Spindle) -> str:
     for table, key in ((content, "radial_load_body"), (content["imperfections"], "unbalance_body")):
         if not table[key]:
             table.pop(key)
-    for row in content["bearings"]:
-        row.pop("told")
-    of_materials = [m[law] for m in content["materials"].values() for law in ("youngs_modulus", "thermal_expansion")]
-    for entries in (*of_materials, content["thermal"]["friction"]["viscosity"]):
-        entries.pop("key")
     if not content["roller_bearings"]:
         content.pop("roller_bearings")
     for film in content["thermal"]["convections"]:
@@ -167,9 +162,16 @@ def content_hash(spindle: Spindle) -> str:
     for segment in (s for shaft in content["structure"]["shafts"] for s in shaft["segments"]):
         if segment["sides"] is None:
             segment.pop("sides")
-    for addition in content["effects"]:
-        addition.pop("definition")
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]
+
+
+def _compared(value: Any) -> Any:
+    """Of dataclasses in mappings and sequences the fields that tell equal ones from others, by name."""
+    if is_dataclass(value):
+        return {f.name: _compared(getattr(value, f.name)) for f in fields(value) if f.compare}
+    if isinstance(value, Mapping):
+        return {key: _compared(v) for key, v in value.items()}
+    return [_compared(v) for v in value] if isinstance(value, tuple | list) else value
 
 
 def _provenance(file: Path, raw: Mapping[str, Any]) -> dict[str, Provenance]:

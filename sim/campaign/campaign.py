@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.model.errors import BadInput, absent, listed
+from thermospindle.model.errors import BadInput, listed
 from thermospindle.model.files.formats import CAMPAIGN, CURRENT, KEY
 from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Condition, Point, Spindle
-from thermospindle.model.scene.fields import read_file
+from thermospindle.model.scene.fields import named, read_file
 from thermospindle.model.units import MINUTE, MM, RPM
 from thermospindle.sim.campaign.form import checked, in_unit, toml
 from thermospindle.sim.campaign.modes import ModeRow, read_modes, with_shapes, write_modes, write_shapes
@@ -112,17 +112,21 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
     raw = read_file(CAMPAIGN, file)
     table = checked(file, raw)
     points = tuple(p.point() for p in table.points)
-    rows = read_modes(_named(file, "modes", table.modes), [t.id for t in table.tests]) if table.modes else []
+
+    def there(key: str, name: str) -> Path:
+        return named(file, key, name, "file", "campaign")
+
+    rows = read_modes(there("modes", table.modes), [t.id for t in table.tests]) if table.modes else []
     if table.shapes:
-        rows = with_shapes(_named(file, "shapes", table.shapes), rows, [p.node for p in points])
+        rows = with_shapes(there("shapes", table.shapes), rows, [p.node for p in points])
     tests = []
     for t in table.tests:
         speed, soak = t.speed_rpm * RPM, None if t.soak_time_min is None else t.soak_time_min * MINUTE
-        frf = read_frf(_named(file, f"tests.{t.id}.frf", t.frf), table.quantity, points) if t.frf else None
+        frf = read_frf(there(f"tests.{t.id}.frf", t.frf), table.quantity, points) if t.frf else None
         modes = tuple(row for row in rows if row.test == t.id)
         if frf is None and not modes and not t.runout:
             raise BadInput(f"{file}: tests.{t.id}: has neither frf nor rows in a table of modes nor runout; one of them is needed")
-        runout = read_runout(_named(file, f"tests.{t.id}.runout", t.runout), points, speed, t.spectrum_window) if t.runout else None
+        runout = read_runout(there(f"tests.{t.id}.runout", t.runout), points, speed, t.spectrum_window) if t.runout else None
         if frf is not None:
             _check_size(folder / str(t.frf), frf)
             check_frf(folder / str(t.frf), frf, speed, limits)
@@ -133,14 +137,6 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
         )
     noise = Noise(table.noise.of_value, table.noise.of_largest) if table.noise else None
     return Campaign(table.title, table.spindle, table.quantity, points, tuple(tests), noise, table.note, table.lumped_shafts, folder)
-
-
-def _named(file: Path, key: str, name: str) -> Path:
-    """The file that a key of campaign.toml names, from its folder. Raises `BadInput` where there is none."""
-    there = file.parent / name
-    if not there.is_file():
-        raise BadInput(f"{file}: {key} = {name!r}: {there}: {absent(there)}; allowed is a file, told from the folder of the campaign")
-    return there
 
 
 def _check_size(file: Path, frf: Frf) -> None:

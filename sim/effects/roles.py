@@ -14,7 +14,7 @@ import numpy as np
 from thermospindle.model.bearing.row import ring_speeds
 from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
 from thermospindle.model.rotor.chain import Element
-from thermospindle.model.structure import Body, Joint
+from thermospindle.model.structure import Body
 from thermospindle.model.types import Array
 
 
@@ -63,13 +63,8 @@ def with_stiffness(spindle: Spindle, factor: Mapping[str, float], tilt: Mapping[
     if not factor:
         return spindle
     tilt = factor if tilt is None else tilt
-    changed = tuple(_scaled(j, factor[j.name], tilt[j.name]) if j.name in factor else j for j in spindle.structure.joints)
+    changed = tuple(j.stiffer(factor[j.name], tilt[j.name]) if j.name in factor else j for j in spindle.structure.joints)
     return replace(spindle, structure=replace(spindle.structure, joints=changed))
-
-
-def _scaled(joint: Joint, factor: float, tilt: float) -> Joint:
-    x, y, z, tilt_x, tilt_y = joint.stiffness
-    return replace(joint, stiffness=(factor * x, factor * y, factor * z, tilt * tilt_x, tilt * tilt_y))
 
 
 def with_mass(body: Body, mass: float, z: float, inertia: tuple[float, float, float]) -> Body:

@@ -16,7 +16,7 @@ HEADER = "temperature_C,speed_rpm,radial_stiffness_N_per_m,axial_stiffness_N_per
 
 def grid(folder, header=HEADER, row="20,0,2e7,0"):
     (folder / "bearing.csv").write_text(f"{header}\n{row}\n", encoding="utf-8")
-    return Numbers(table="bearing.csv", damping_ratio=0.05).grid(folder)
+    return Numbers(table="bearing.csv", damping_ratio=0.05).grid(folder / "spindle.toml", "table")
 
 
 def test_a_table(tmp_path):
@@ -69,7 +69,7 @@ def test_a_cross_coupled_bearing_is_refused_with_its_entries():
 def test_lines_of_a_table_of_several_bearings_are_the_file_s(tmp_path):
     (tmp_path / "both.csv").write_text(f"# made by hand\nbearing,{HEADER}\nA,20,0,2e7,0\nB,20,0,2e7,0\nB,60,0,x,0\n", encoding="utf-8")
     with pytest.raises(BadInput, match=r"both\.csv: line 5: radial_stiffness_N_per_m = 'x'"):
-        Numbers(table="both.csv", bearing="B", damping_ratio=0.05).grid(tmp_path)
+        Numbers(table="both.csv", bearing="B", damping_ratio=0.05).grid(tmp_path / "spindle.toml", "table")
 
 
 def test_a_matrix_of_zeros_is_refused_as_a_table_of_zeros_is():

@@ -78,7 +78,7 @@ def test_a_bearing_under_a_radial_load_is_told_along_x_and_along_y(table, tmp_pa
     assert f"radial stiffness along x {slopes[0][0] / 1e6:.2f} N/um, along y {slopes[1][1] / 1e6:.2f} N/um" in said
     assert "k_yy" in said
     assert read_table(tmp_path / "out" / "table.csv").values["front1"]["radial_stiffness_y_N_per_m"][0, 0] == told["radial_stiffness_y_N_per_m"]
-    stiffness = np.reshape(Numbers(table="table.csv", bearing="front1", damping_ratio=0.0).grid(tmp_path / "out")[2], (5, 5))
+    stiffness = np.reshape(Numbers(table="table.csv", bearing="front1", damping_ratio=0.0).grid(tmp_path / "out" / "spindle.toml", "table")[2], (5, 5))
     assert stiffness[:2, :2] == pytest.approx(state.stiffness[:2, :2], rel=1e-12)
     assert np.diag(stiffness) == pytest.approx(np.diag(state.stiffness), rel=1e-12)
 
@@ -100,7 +100,7 @@ def test_a_table_of_a_loaded_bearing_holds_its_whole_stiffness(grinding, tmp_pat
     assert set(BETWEEN) < set(read_table(tmp_path / "table.csv").values["front"])
     largest = 0.0
     for name in found.values:
-        _, _, flat = Numbers(table="table.csv", bearing=name, damping_ratio=0.0).grid(tmp_path)
+        _, _, flat = Numbers(table="table.csv", bearing=name, damping_ratio=0.0).grid(tmp_path / "spindle.toml", "table")
         for i, t in enumerate(temperatures):
             for j, speed in enumerate(speeds):
                 own = operating_point(spindle, Condition(t, speed)).state.bearing(name).stiffness
@@ -137,7 +137,7 @@ def test_a_matrix_that_differs_in_tilts_alone_is_told(tmp_path):
     name = next(iter(raw["bearings"]))
     raw["bearings"][name]["numbers"] = {"matrix_SI": matrix.tolist(), "damping_ratio": 0.02}
     write_table(stiffness_table(build(raw, ROOT / "scenes" / "mk7702" / "spindle.toml"), [20.0]), tmp_path / "table.csv")
-    assert np.reshape(Numbers(table="table.csv", bearing=name, damping_ratio=0.0).grid(tmp_path)[2], (5, 5)) == pytest.approx(matrix, rel=1e-15)
+    assert np.reshape(Numbers(table="table.csv", bearing=name, damping_ratio=0.0).grid(tmp_path / "spindle.toml", "table")[2], (5, 5)) == pytest.approx(matrix, rel=1e-15)
 
 
 def test_answers_between_grid_points(table, spindle):

@@ -21,10 +21,9 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     added = values["contact_share"] * (1 / max(1 - lost, LOOSE) - 1)
 
     def loosened(joint: Joint) -> Joint:
-        x, y, z, tilt_x, tilt_y = joint.stiffness
         move, tilt = 1 / (1 + values["translation_share"] * added), 1 / (1 + added)
         rubbing = (joint.damping_ratio + values["loss_factor"] / 2 * added) * tilt if added > 0.0 else joint.damping_ratio
-        return replace(joint, stiffness=(move * x, move * y, move * z, tilt * tilt_x, tilt * tilt_y), damping_ratio=rubbing)
+        return replace(joint.stiffer(move, tilt), damping_ratio=rubbing)
 
     structure = spindle.structure
     return replace(spindle, structure=replace(structure, joints=tuple(loosened(j) if j.role == "flange" else j for j in structure.joints)))
