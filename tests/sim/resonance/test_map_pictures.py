@@ -14,8 +14,9 @@ from matplotlib.text import Text
 from tests.sim.resonance.conftest import NOMINAL
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import STYLE
-from thermospindle.report.figures.resonance import CAUSES, both, campbell, over_temperature, runout
+from thermospindle.report.figures.resonance import CAUSES, both, campbell, figures, over_temperature, runout
 from thermospindle.report.figures.warmup import MODES
+from thermospindle.report.text.resonance import map_section, told
 from thermospindle.sim.resonance.map import resonance_map
 
 
@@ -106,3 +107,24 @@ def test_where_no_line_meets_a_mode_the_picture_says_so(spindle):
         [axes] = both(near).axes
     assert axes.get_xlim() == pytest.approx((7000.0, 7300.0))
     assert [t.get_text() for t in axes.texts] == ["no line meets a mode here"]
+
+
+def test_where_all_runout_repeats_a_sentence_stands_for_its_figure(met):
+    """Bearings by numbers have unbalance alone: two empty panels with a curve of zeros over another."""
+    along = {name: getattr(met, name) * [1.0, 0.0, 0.0] for name in ("nrro_speed", "nrro_temperature")}
+    still = replace(met, **along)
+    assert (met.repeats, still.repeats) == (False, True)
+    assert set(figures(met)) - set(figures(still)) == {"nrro"}
+    for known, numbers in ((still, ""), (replace(still, spindle=replace(met.spindle, bearings=())), " (bearings given by numbers roll no balls)")):
+        assert told(known)[-1] == f"All runout of this map repeats every revolution{numbers}, so there is no figure of nonrepeatable runout (NRRO)."
+    html = map_section(still)[1]
+    assert html.count("<svg") == 3
+    assert "All runout of this map repeats" in html
+    assert "All runout" not in map_section(met)[1]
+
+
+def test_runout_over_speed_begins_where_the_spindle_turns(found):
+    """At rest there is none, and at the slowest speed it is that of balls that pass waves: a ramp was drawn from 0 to it, which is not there."""
+    assert found.nrro_speed[0].tolist() == [0.0, 0.0, 0.0]
+    drawn = figures(found)["nrro"].axes[1].lines[0].get_xydata()
+    assert drawn[0] == pytest.approx(found.nrro_speed[1, :2] * [1 / RPM, 1e9])

@@ -1,4 +1,4 @@
-"""What a map says of lines that repeat every revolution, of one line in several bearings, and of places of its grid that are one."""
+"""What a map says: what was mapped and crossed, lines that repeat every revolution, one line in several bearings, and places of its grid that are one."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from tests.sim.resonance.conftest import NOMINAL
+from thermospindle.cli import main
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.sense import of_conditions
 from thermospindle.model.units import RPM
-from thermospindle.report.text.resonance import map_json, nearby, sentences, show_map
+from thermospindle.report.log.turning.map import summary
+from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, nearby, sentences, show_map, told
 from thermospindle.sim.resonance.found import Coincidence, Interpolated, ResonanceMap
 from thermospindle.sim.resonance.map import _with, resonance_map
 
@@ -102,3 +105,61 @@ def test_what_is_met_just_beyond_the_speeds_asked_for_is_told(spindle):
     assert not any(5500 <= c.condition.speed / RPM <= 6900 for c in near.beyond)
     assert "20 (fo-fc)" not in " ".join(nearby(found(6000.0)))
     assert nearby(resonance_map(spindle, [20.0, 25.0], np.array([5500.0, 6900.0]) * RPM, nominal)) == []
+
+
+def test_answer_as_json(met):
+    answer = map_json(met)
+    first = answer["coincidences"][0]
+    for name in ("line", "mode", "temperature_C", "speed_rpm", "frequency_Hz", "bearing", "cause", "strength_um", "margin_percent"):
+        assert name in first
+    assert first["speed_rpm"] == pytest.approx(7200.0)
+    assert np.shape(answer["modes"][0]["frequency_Hz"]) == (len(answer["grid"]["temperature_C"]), len(answer["grid"]["speed_rpm"]))
+    said = sentences(met)
+    assert said[0].startswith("This spindle at 7200 rpm crosses 30 (fo-fc) + fo (outer waviness of order 31 of the upper bearing)")
+    assert f"{first['temperature_C']:.1f} C" in said[0]
+    title, html = map_section(met)
+    assert title == "Resonance map"
+    assert html.count("<svg") == 4
+
+
+def test_a_sentence_tells_what_was_mapped(spindle, found):
+    """One number for --speeds is one speed, beside the nominal one, and no end of a range."""
+    assert mapped(found) == "Mapped at 9 temperatures from 20 to 60 C, and at 17 speeds from 0 to 14400 rpm; the nominal 20 C and 7200 rpm are always among them."
+    one = resonance_map(spindle, [22.0], [3000 * RPM], NOMINAL)
+    assert mapped(one) == "Mapped at 2 temperatures, 20 and 22 C, and at 2 speeds, 3000 and 7200 rpm; the nominal 20 C and 7200 rpm are always among them."
+    assert map_json(one)["mapped"] == mapped(one)
+    console = Console(record=True, width=300, file=io.StringIO())
+    show_map(console, one)
+    assert mapped(one) in console.export_text()
+    assert "at 2 speeds, 3000 and 7200" in map_section(one)[1]
+    none, console = replace(one, coincidences=()), Console(record=True, width=3000, file=io.StringIO())
+    show_map(console, none)
+    assert "Lines on the map: " in (text := console.export_text())
+    assert one.lines[0].line.name in text
+    assert "of the scene's imperfections" in text if one.drawn_from is None else f"(seed {one.drawn_from}; the scene names none)" in text
+    for shown in (map_section(none)[1], summary(none)):  # the head of a table stood over no row, in the report and in the log
+        assert "Lines on the map: " in shown
+        assert "margin" not in shown
+    assert "Lines on the map" not in map_section(one)[1]
+
+
+def test_help_says_which_speeds_are_mapped(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["map", "--help"])
+    assert "every speed to map, the nominal one added: one number is one speed and no end of a range" in " ".join(capsys.readouterr().out.split())
+
+
+def test_sentence_without_a_crossing(spindle):
+    near = resonance_map(spindle, [20.0, 22.0], [7000 * RPM, 7300 * RPM], NOMINAL)
+    assert "crosses no line between 20 and 22 C; nearest is 20 (fo-fc)" in sentences(near)[0]
+
+
+def test_many_crossings_are_told_by_the_strongest_and_a_number(met):
+    """A machine tool crosses a score of lines at its speed: in words come the first, the answer has all."""
+    [crossed] = [c for c in met.coincidences if c.at_nominal_speed][:1]
+    many = replace(met, coincidences=(crossed,) * (SAID + 3))
+    assert len(sentences(many)) == SAID + 3
+    assert told(many)[:-1] == sentences(many)[:SAID]
+    assert told(many)[-1] == "So do 3 weaker lines between 20 and 58.5 C; all are in coincidences.csv of spindle map --out, and in its --json."
+    few = replace(met, coincidences=(crossed,) * (SAID + 1))
+    assert told(few) == sentences(few)

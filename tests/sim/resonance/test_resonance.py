@@ -1,17 +1,13 @@
-"""The resonance map: crossings against a closed form, exactness, direction and sense of whirl, strength, and what it tells."""
+"""The resonance map: crossings against a closed form, exactness, direction and sense of whirl, strength."""
 
-import io
-import json
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from tests.sim.resonance.conftest import NOMINAL
-from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import lines, row_kinematics
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
@@ -19,11 +15,6 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.resonance import figures
-from thermospindle.report.log.read import read_log
-from thermospindle.report.log.told import describe, log_json
-from thermospindle.report.log.turning.map import summary, write_map_log
-from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.between import passes_zero
 from thermospindle.sim.resonance.found import strongest
@@ -156,154 +147,6 @@ def test_grids_that_make_no_map(spindle):
         resonance_map(spindle, [20.0, 30.0], [NOMINAL.speed], NOMINAL)
     with pytest.raises(BadInput, match="negative"):
         resonance_map(spindle, [20.0, 30.0], [-700.0, 700.0], NOMINAL)
-
-
-def test_one_temperature_makes_a_campbell_diagram(tmp_path, capsys):
-    """With the numbers of a map over several, and without the pictures over temperature; it was refused."""
-    asked = ["map", str(SCENE), "--speeds", "3600", "7200", "--json", "--temperatures", "20"]
-    assert main([*asked, "--out", str(tmp_path / "one")]) == 0
-    one = json.loads(capsys.readouterr().out)
-    assert main([*asked, "30"]) == 0
-    more = json.loads(capsys.readouterr().out)
-    assert [m["frequency_Hz"] for m in one["modes"]] == [m["frequency_Hz"][:1] for m in more["modes"]]
-    assert one["nrro_um"]["over_speed"]["speed_rpm"][-1] == 7200.0
-    assert one["mapped"].startswith("Mapped at one temperature, 20 C, and at 2 speeds")
-    assert "crosses no line at 20 C" in one["sentences"][0]
-    assert {p.name for p in (tmp_path / "one").glob("*.png")} == {"campbell.png", "nrro.png"}
-    assert main(["inspect", str(tmp_path / "one" / "map.rrd")]) == 0
-    assert "modes at 1 temperature x 2 speeds" in capsys.readouterr().out
-    assert main(["map", str(SCENE), "--speeds", "7200"]) == 2
-    assert "--speeds 7200: a map needs at least two different ones, the nominal 7200 rpm included" in capsys.readouterr().err
-
-
-def test_answer_as_json(met):
-    answer = map_json(met)
-    first = answer["coincidences"][0]
-    for name in ("line", "mode", "temperature_C", "speed_rpm", "frequency_Hz", "bearing", "cause", "strength_um", "margin_percent"):
-        assert name in first
-    assert first["speed_rpm"] == pytest.approx(7200.0)
-    assert np.shape(answer["modes"][0]["frequency_Hz"]) == (len(answer["grid"]["temperature_C"]), len(answer["grid"]["speed_rpm"]))
-    said = sentences(met)
-    assert said[0].startswith("This spindle at 7200 rpm crosses 30 (fo-fc) + fo (outer waviness of order 31 of the upper bearing)")
-    assert f"{first['temperature_C']:.1f} C" in said[0]
-    title, html = map_section(met)
-    assert title == "Resonance map"
-    assert html.count("<svg") == 4
-
-
-def test_where_all_runout_repeats_a_sentence_stands_for_its_figure(met):
-    """Bearings by numbers have unbalance alone: two empty panels with a curve of zeros over another."""
-    along = {name: getattr(met, name) * [1.0, 0.0, 0.0] for name in ("nrro_speed", "nrro_temperature")}
-    still = replace(met, **along)
-    assert (met.repeats, still.repeats) == (False, True)
-    assert set(figures(met)) - set(figures(still)) == {"nrro"}
-    for known, numbers in ((still, ""), (replace(still, spindle=replace(met.spindle, bearings=())), " (bearings given by numbers roll no balls)")):
-        assert told(known)[-1] == f"All runout of this map repeats every revolution{numbers}, so there is no figure of nonrepeatable runout (NRRO)."
-    html = map_section(still)[1]
-    assert html.count("<svg") == 3
-    assert "All runout of this map repeats" in html
-    assert "All runout" not in map_section(met)[1]
-
-
-def test_runout_over_speed_begins_where_the_spindle_turns(found):
-    """At rest there is none, and at the slowest speed it is that of balls that pass waves: a ramp was drawn from 0 to it, which is not there."""
-    assert found.nrro_speed[0].tolist() == [0.0, 0.0, 0.0]
-    drawn = figures(found)["nrro"].axes[1].lines[0].get_xydata()
-    assert drawn[0] == pytest.approx(found.nrro_speed[1, :2] * [1 / RPM, 1e9])
-
-
-def test_a_sentence_tells_what_was_mapped(spindle, found):
-    """One number for --speeds is one speed, beside the nominal one, and no end of a range."""
-    assert mapped(found) == "Mapped at 9 temperatures from 20 to 60 C, and at 17 speeds from 0 to 14400 rpm; the nominal 20 C and 7200 rpm are always among them."
-    one = resonance_map(spindle, [22.0], [3000 * RPM], NOMINAL)
-    assert mapped(one) == "Mapped at 2 temperatures, 20 and 22 C, and at 2 speeds, 3000 and 7200 rpm; the nominal 20 C and 7200 rpm are always among them."
-    assert map_json(one)["mapped"] == mapped(one)
-    console = Console(record=True, width=300, file=io.StringIO())
-    show_map(console, one)
-    assert mapped(one) in console.export_text()
-    assert "at 2 speeds, 3000 and 7200" in map_section(one)[1]
-    none, console = replace(one, coincidences=()), Console(record=True, width=3000, file=io.StringIO())
-    show_map(console, none)
-    assert "Lines on the map: " in (text := console.export_text())
-    assert one.lines[0].line.name in text
-    assert "of the scene's imperfections" in text if one.drawn_from is None else f"(seed {one.drawn_from}; the scene names none)" in text
-    for shown in (map_section(none)[1], summary(none)):  # the head of a table stood over no row, in the report and in the log
-        assert "Lines on the map: " in shown
-        assert "margin" not in shown
-    assert "Lines on the map" not in map_section(one)[1]
-
-
-def test_help_says_which_speeds_are_mapped(capsys):
-    with pytest.raises(SystemExit, match="0"):
-        main(["map", "--help"])
-    assert "every speed to map, the nominal one added: one number is one speed and no end of a range" in " ".join(capsys.readouterr().out.split())
-
-
-def test_sentence_without_a_crossing(spindle):
-    near = resonance_map(spindle, [20.0, 22.0], [7000 * RPM, 7300 * RPM], NOMINAL)
-    assert "crosses no line between 20 and 22 C; nearest is 20 (fo-fc)" in sentences(near)[0]
-
-
-def test_many_crossings_are_told_by_the_strongest_and_a_number(met):
-    """A machine tool crosses a score of lines at its speed: in words come the first, the answer has all."""
-    [crossed] = [c for c in met.coincidences if c.at_nominal_speed][:1]
-    many = replace(met, coincidences=(crossed,) * (SAID + 3))
-    assert len(sentences(many)) == SAID + 3
-    assert told(many)[:-1] == sentences(many)[:SAID]
-    assert told(many)[-1] == "So do 3 weaker lines between 20 and 58.5 C; all are in coincidences.csv of spindle map --out, and in its --json."
-    few = replace(met, coincidences=(crossed,) * (SAID + 1))
-    assert told(few) == sentences(few)
-
-
-# ------------------------------------------------------------------ log and command line
-
-
-def test_log_gives_the_map_back(light, tmp_path):
-    """Grid and natural frequencies bit for bit, coincidences as told; a timeline for each axis, and a blueprint."""
-    met = resonance_map(light, [20.0, 58.5], np.array([6000, 8400]) * RPM, NOMINAL)
-    assert (len(met.temperatures), len(met.speeds)) == (2, 3)
-    assert len(met.coincidences) > 10
-    write_map_log(met, tmp_path / "map.rrd")
-    read = read_log(tmp_path / "map.rrd")
-    assert read.kind == "map"
-    temperatures, speeds, modes = read.grid
-    assert np.array_equal(temperatures, met.temperatures)
-    assert np.array_equal(speeds, met.speeds)
-    for m, track in enumerate(met.modes):
-        assert np.array_equal(modes[:, m], track.frequency)
-    told = map_json(met)["coincidences"]
-    assert read.rows("/numbers/coincidences") == told
-    assert {"temperature, 0.01 C", "speed"} <= set(read.timelines)
-    assert read.blueprint
-    assert f"{len(told)} coincidences" in describe(read)
-    assert log_json(read)["modes_Hz"][0][0][0] == met.modes[0].frequency[0, 0]
-
-
-@pytest.mark.slow
-def test_log_without_its_numbers_is_refused(met, tmp_path):
-    write_map_log(met, tmp_path / "map.rrd")
-    whole = read_log(tmp_path / "map.rrd")
-    for entity in ("/numbers/modes", "/numbers/speeds"):
-        less = replace(whole, columns={k: v for k, v in whole.columns.items() if k != entity})
-        with pytest.raises(BadInput, match=rf"map.rrd: is not a whole log of thermospindle: .*{entity}"):
-            log_json(less)
-    with pytest.raises(BadInput, match="folder"):
-        write_map_log(met, tmp_path / "none" / "map.rrd")
-
-
-@pytest.mark.slow
-def test_map_from_the_command_line(tmp_path, capsys):
-    scene, out = str(SCENE), tmp_path / "out"
-    grid = ["--temperatures", "20", "50", "--speeds", "5000", "8000"]
-    assert main(["map", scene, *grid, "--speed", "7200", "--json", "--out", str(out)]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["grid"]["speed_rpm"] == pytest.approx([5000.0, 7200.0, 8000.0])
-    assert any(c["line"] == "30 fc" and c["mode"] == 5 for c in answer["coincidences"])
-    assert {p.name for p in out.iterdir()} >= {"coincidences.csv", "modes.csv", "campbell.png", "campbell.svg", "temperature.png", "map.rrd"}
-    assert main(["inspect", str(out / "map.rrd"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["coincidences"] == answer["coincidences"]
-    assert main(["map", scene, "--speed", "0"]) == 2
-    assert "--speed 0" in capsys.readouterr().err
 
 
 @pytest.mark.slow
