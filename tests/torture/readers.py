@@ -120,7 +120,7 @@ def _published(file: Path) -> None:
 
 def _bearing_table(file: Path) -> None:
     """The table of stiffness that a scene names."""
-    grid = Numbers(table=file.name, bearing="upper", damping_ratio=0.01).grid(file.parent)
+    grid = Numbers(table=file.name, bearing="upper", damping_ratio=0.01).grid(file.with_name("spindle.toml"), "table")
     assert all(np.isfinite(part).all() for part in grid)
 
 
