@@ -55,6 +55,10 @@ def test_modes(capsys, tmp_path):
     for mode in found["modes"]:
         assert mode["kind"] in {"axial", "rocking", "lateral"}
         assert {"base", "bearings"} <= set(mode["energy"])
+        shape = np.array([complex(p["real"], p["imaginary"]) for p in mode["shape"]])
+        assert [p["node"] for p in mode["shape"]] == [1, 2, 3, 4, 5, 6, 7]
+        assert max(shape.real) == pytest.approx(1.0, abs=1e-12)
+        assert (np.abs(shape.imag).max() < 0.02) == (mode["whirl"] == "none")  # what whirls is a quarter of a turn behind along y
         assert sum(mode["energy"].values()) == pytest.approx(1.0)
         assert 0 < mode["damping_ratio"] < 0.1
     assert {p.name for p in (tmp_path / "m").iterdir()} == {"modes.csv", "spindle.xml", MARK}

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from thermospindle.sim.operating import OperatingPoint
 
 MOST = 3  # elements named in a failure
+HARDLY = 0.005  # of the energy, that is told as nothing
 NEIGHBOURS = 2  # modes shown on each side of the one in question
 
 
@@ -38,8 +39,11 @@ def table(first: OperatingPoint, then: OperatingPoint, partners: Sequence[int], 
 
 def energy(point: OperatingPoint, index: int) -> list[str]:
     mode = point.modes[index]
-    most = sorted(_by_part(point, mode.energy).items(), key=lambda e: -e[1])[:MOST]
-    return [f"  strain energy of {mode.kind} at {mode.frequency:.1f} Hz: " + ", ".join(f"{name} {share:.0%}" for name, share in most)]
+    parts = sorted(_by_part(point, mode.energy).items(), key=lambda e: -e[1])
+    most = [f"{name} {share:.0%}" for name, share in parts[:MOST]]
+    left = sum(share for _, share in parts[MOST:])
+    rest = [f"all others {left:.0%}"] if left >= HARDLY else []
+    return [f"  strain energy of {mode.kind} at {mode.frequency:.1f} Hz: {', '.join([*most, *rest])}"]
 
 
 def _by_part(point: OperatingPoint, of_elements: Mapping[str, float]) -> dict[str, float]:

@@ -149,6 +149,7 @@ def assert_margin(
     """
     __tracebackhide__ = True
     from thermospindle.model.bearing.kinematics import lines, row_kinematics
+    from thermospindle.model.bearing.pair import check_centred
     from thermospindle.model.errors import BadInput
 
     _asked(["at_least_percent"], at_least_percent=at_least_percent)
@@ -161,6 +162,7 @@ def assert_margin(
     index = _index(points[0], mode)
     near: list[tuple[float, str]] = []
     for point in points:
+        check_centred(point.spindle, point.state, "assert_margin")
         own = _partner(points[0], point, index, _partners(points[0], point))
         for line in lines(point.spindle, row_kinematics(point.spindle, point.state), point.condition.speed, multiples):
             if (line.direction == "axial") == (own.kind == "axial"):

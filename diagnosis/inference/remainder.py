@@ -88,12 +88,13 @@ def between_tests(left: Sequence[tuple[Array, Array]], alike: float = 1.0) -> fl
 
 def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: Sequence[float] = (0.0,)) -> tuple[Resonance, float] | None:
     """The light resonance that would explain most beside the model `about`, its frequency moving by one of `drifts`, and the ln evidence that it promises; None where no
-    test has FRF lines.
+    test has FRF lines, or no mode of the reference is in their band.
 
     To first order the products of its shares count, a symmetric matrix; its shares are the first eigenvector's, those of modes beyond the band none.
     """
     lines = [d.frequency for d in model.tests if isinstance(d, LineData)]
-    if not lines:
+    seen = model.reference.seen
+    if not lines or not seen:
         return None
     problem = Problem(model, about.mechanisms, learned, about.moved)
     at = linearised(model, about)
@@ -107,7 +108,6 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: 
     shifts = np.array([[round(drift * model.far(t) / SPACING) for t, _ in with_lines] for drift in drifts])
     beyond, count = int(np.abs(shifts).max()), int(np.log(high / low) / SPACING) + 1
     grid = np.exp(np.log(low) + SPACING * np.arange(-beyond, count + beyond))
-    seen = model.reference.seen
     lights = [Light(np.zeros((0, 0)), np.zeros(0), 2 * np.pi * float(f), DAMPING) for f in grid]
     k = seen * (seen + 1) // 2
     own = []

@@ -105,10 +105,14 @@ class PairState:
         raise BadInput(f"{name!r} is no ball bearing here; {instead(str(name), [b.name for b in self.bearings])}")
 
 
-def check_centred(state: PairState, what: str) -> None:
+def check_centred(spindle: Spindle, state: PairState, what: str) -> None:
     """`BadInput` where a radial load displaces rings, for `what` takes rows with centred ones."""
     if any(b.displacement for b in state.bearings):
-        raise BadInput(f"{what} is for centred rings, and here radial_load_N displaces them; take it out, or ask what their stiffness decides: modes, table, static, impact with linear elements")
+        load = ", ".join(f"{f:g}" for f in spindle.radial_load)
+        raise BadInput(
+            f"{spindle.file or spindle.name}: radial_load_N = [{load}]: {what} is for centred rings, and this displaces them; take it out, or ask what their stiffness decides: "
+            "modes, table, static, impact with linear elements"
+        )
 
 
 def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMotion]) -> PairState:

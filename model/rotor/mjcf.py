@@ -37,7 +37,7 @@ def spec(spindle: Spindle, state: PairState, element: str = "linear", looks: boo
         raise ValueError(f"bearing element {element!r} is unknown; allowed are {', '.join(ELEMENTS)}")
     chain = chain or rotor_base(spindle, state)
     if element == "ball-by-ball":
-        check_centred(state, "--element ball-by-ball")
+        check_centred(spindle, state, "--element ball-by-ball")
     slides = {e.name for e in chain.elements if e.slides}  # balls of a ring on a spring stay one element, which knows its ring
     balls = {b.name: b for b in state.bearings if b.name not in slides} if element == "ball-by-ball" else {}
     out = chain_spec(chain, spindle.hammer.step, stiff=tuple(e.name for e in chain.elements if e.name not in balls))

@@ -158,7 +158,7 @@ def read_toml(file: Path) -> dict[str, Any]:
     if not file.is_file():  # a pipe would be waited for
         raise BadInput(f"{file}: {absent(file)}")
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8-sig"))  # a byte order mark is what some editors begin a file with
+        tables = tomllib.loads(file.read_text(encoding="utf-8-sig"))  # a byte order mark is what some editors begin a file with
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise BadInput(f"{file}: line {line} has a byte that is no UTF-8 ({error.object[error.start]:#04x}), as of another encoding: save the file as UTF-8") from None
@@ -166,6 +166,9 @@ def read_toml(file: Path) -> dict[str, Any]:
         raise BadInput(f"{file}: its tables are nested too deep to be read") from None
     except ValueError as error:  # of TOML, of UTF-8, of numbers with thousands of digits
         raise BadInput(f"{file}: not a TOML file: {error}") from None
+    if not tables:
+        raise BadInput(f"{file}: has no keys: it is empty, or all of it is comment")
+    return tables
 
 
 def read_file(kind: str, file: Path) -> dict[str, Any]:

@@ -36,6 +36,8 @@ LEAST_EXPANSION = 0.01
 """um/m K: glass ceramics such as Zerodur have 0.02, and whoever writes 1/K has 1e-5."""
 LEAST_DENSITY = 100.0
 """kg/m3: foams have more, and whoever writes g/cm3 has 1 to 20."""
+DENSEST = 22600.0
+"""kg/m3, of osmium (CRC Handbook of Chemistry and Physics)."""
 OFF = 1.0 * MM
 """How far from its body's surface a point may lie: sensors have bases."""
 COARSE = 2e-3
@@ -70,6 +72,21 @@ def _materials(found: Looked) -> Iterator[str]:
             yield f"material {m.name}: expands by {expansion:.2g} um/m in a kelvin, and even glass ceramics by 0.02; the key takes micrometres per metre and kelvin, of steel 11.5"
         if m.density < LEAST_DENSITY:
             yield f"material {m.name}: has {m.density:g} kg/m3, less than any solid part; of steel it is 7800"
+
+
+def _compact(found: Looked) -> Iterator[str]:
+    """Bodies given by numbers whose mass would have to be denser than any solid: of all shapes a ball has the least largest moment of inertia."""
+    structure = found.spindle.structure
+    for b in structure.bodies:
+        largest = max(b.inertia)
+        if b.regions or not b.mass or not largest or structure.carrier(b.name) != b.name:  # of a shaft's pieces it is told by its segments
+            continue
+        density = b.mass / (4 / 3 * np.pi * (2.5 * largest / b.mass) ** 1.5)
+        if density > DENSEST:
+            yield (
+                f"body {b.name!r}: {b.mass:.4g} kg with moments of inertia of at most {largest:.3g} kg m2 would be a ball of {density:.2g} kg/m3 at the least, and no metal has more than {DENSEST:.3g}: "
+                "a mass in g, or a moment of inertia in another unit than its key's?"
+            )
 
 
 def _free(found: Looked) -> Iterator[str]:
@@ -245,5 +262,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    *OF_BEARINGS, _seats, _materials, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _planes, _effects,
+    *OF_BEARINGS, _seats, _materials, _compact, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _planes, _effects,
 )  # fmt: skip

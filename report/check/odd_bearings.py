@@ -14,6 +14,7 @@ from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import Bearing, Condition, LinearBearing
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS, pressures
+from thermospindle.model.shaft import SAME_HEIGHT
 from thermospindle.model.units import MM, RPM
 from thermospindle.report.check.looked import Looked
 from thermospindle.report.check.understood import free_angle
@@ -58,6 +59,18 @@ def _same_place(found: Looked) -> Iterator[str]:
         same = {carrier(a.inner_body), carrier(a.outer_body)} == {carrier(b.inner_body), carrier(b.outer_body)}
         if same and abs(a.z - b.z) < 0.1 * MM:
             yield f"bearings {a.name} and {b.name} sit at the same place, z_mm = {a.z / MM:g}, between the same parts: one of them may be meant elsewhere"
+
+
+def _raceways(found: Looked) -> Iterator[str]:
+    """Raceways told wider than what is left of a ring about them."""
+    for b in found.spindle.ringed:
+        for ring in (b.inner_ring, b.outer_ring):
+            low, high = found.spindle.region(ring).z
+            if b.raceway_width is not None and (b.z - b.raceway_width / 2 < low - SAME_HEIGHT or b.z + b.raceway_width / 2 > high + SAME_HEIGHT):
+                yield (
+                    f"bearing {b.name}: a raceway of {b.raceway_width / MM:g} mm about z_mm = {b.z / MM:g} goes beyond its ring {ring!r}, which spans {low / MM:g} to {high / MM:g}, "
+                    "and is taken to end there"
+                )
 
 
 def _contacts(found: Looked) -> Iterator[str]:
@@ -199,4 +212,4 @@ def _constant(b: LinearBearing) -> bool:
     return len(b.temperature) * len(b.speed) == 1
 
 
-OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _massless, _same_place, _contacts, _angles, _catalogues, _soft, _preload, _half_sprung, _pressed, _pushed, _sense, _tables)
+OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _massless, _same_place, _raceways, _contacts, _angles, _catalogues, _soft, _preload, _half_sprung, _pressed, _pushed, _sense, _tables)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 import rerun.blueprint as rrb
 from scipy.spatial.transform import Rotation
@@ -88,8 +90,9 @@ def log_frf_numbers(recording: rr.RecordingStream, id: str, order: int, temperat
 
 
 def log_peak_numbers(recording: rr.RecordingStream, peaks: Sequence[Peak]) -> None:
-    values = {name: [getattr(p, name) for p in peaks] for name in Peak.__dataclass_fields__}
-    log_values(recording, "numbers/peaks", values)
+    """Their types are told, without which Rerun takes no list of none."""
+    types = {"str": pa.string(), "int": pa.int64(), "float": pa.float64()}
+    log_values(recording, "numbers/peaks", {f.name: pa.array([getattr(p, f.name) for p in peaks], types[str(f.type)]) for f in fields(Peak)})
 
 
 # ---------------------------------------------------------------- for the eye

@@ -221,7 +221,8 @@ def read_log(path: Path) -> Log:
     except (RuntimeError, ValueError, OSError) as error:
         if isinstance(error, BadInput):
             raise
-        raise BadInput(f"{path}: not a Rerun log that can be read: {error}") from None
+        why = "" if "Not an RRD file" in str(error) else f" that can be read: {error}"
+        raise BadInput(f"{path}: not a Rerun log{why}") from None
     columns: dict[str, dict[str, list[pa.Array]]] = {}
     rows: dict[str, int] = {}
     for entity, timelines, batch in batches:

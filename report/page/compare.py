@@ -9,6 +9,7 @@ from markupsafe import Markup, escape
 
 from thermospindle.diagnosis.compare.before_after import BeforeAfter
 from thermospindle.diagnosis.compare.compare import Comparison
+from thermospindle.diagnosis.data.observe import FREQUENCY_FLOOR
 from thermospindle.diagnosis.runout.compare import RunoutBeside
 from thermospindle.model.machine import Spindle
 from thermospindle.report.figures.common import label, save, svg
@@ -17,7 +18,7 @@ from thermospindle.report.figures.runout_campaign import comparison_figures
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.page import runout_compare as runout
 from thermospindle.report.page.report import Section, write_page
-from thermospindle.report.text.compare import AGREES, TOGETHER, constant_words, unlike
+from thermospindle.report.text.compare import AGREES, TOGETHER, constant_words, unlike, without_modes
 from thermospindle.report.text.runout_compare import before_after
 from thermospindle.report.typeset import figure, minus, prose, signed, table, with_error
 
@@ -91,9 +92,8 @@ def write_comparison(
 
 def _summary(c: Comparison) -> str:
     modes = [m for t in c.tests for m in t.modes]
-    words = [
-        f"<p>{Markup.escape(c.campaign)} beside the scene {Markup.escape(c.spindle)}: rms residual <b>{c.rms_residual:.3g} standard errors</b>"
-    ]
+    said = without_modes(c) or Markup("rms residual <b>{:.3g} standard errors</b>").format(c.rms_residual)
+    words = [f"<p>{Markup.escape(c.campaign)} beside the scene {Markup.escape(c.spindle)}: {said}"]
     if modes:
         alike = [m for m in modes if not unlike(m)] or modes
         residuals = [(m.residual, f"{signed(m.error, 2)} Hz", m) for m in alike]
@@ -145,5 +145,5 @@ def _table(c: Comparison) -> str:
             rows.append(cells)
     starred = any(m.close and m.mac is not None for t in c.tests for m in t.modes)
     note = " * Close modes: share of the measured shape in the plane of the computed ones." if starred else ""
-    caption = f"Every mode of every test, with one standard error. MAC: modal assurance criterion.{note}"
-    return table(head, rows, (0, 2), caption, "compared", ruled=True)
+    caption = f"Every mode of every test, with one standard error, the model's own numerical one of {1e6 * FREQUENCY_FLOOR:.0f} ppm in it. MAC: modal assurance criterion.{note}"
+    return table(head, rows, (0, 2), caption, "compared", ruled=True) if rows else ""

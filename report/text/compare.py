@@ -12,6 +12,7 @@ from thermospindle.diagnosis.compare.before_after import BeforeAfter
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
 from thermospindle.diagnosis.compare.constant import constant_errors
 from thermospindle.diagnosis.compare.correlation import Band
+from thermospindle.diagnosis.data.observe import FREQUENCY_FLOOR
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE
 from thermospindle.model.errors import listed
 from thermospindle.model.units import RPM
@@ -98,10 +99,12 @@ UNLIKE = 0.1
 
 def verdict(c: Comparison) -> str:
     """One sentence: whether they agree, by how much they do not, and the modes that are furthest off, in standard errors and in Hz."""
+    if without := without_modes(c):
+        return f"{c.spindle}: {without}."
     words = "agrees with the tests within their errors" if c.rms_residual < AGREES else "nearly agrees with the tests" if c.rms_residual < ALMOST else "does not agree with the tests"
     sentence = f"{c.spindle} {words}: rms residual {c.rms_residual:.3g} standard errors"
     every = [(t, m) for t in c.tests for m in t.modes]
-    if c.rms_residual < AGREES or not (every or any(t.missing for t in c.tests)):
+    if c.rms_residual < AGREES:
         turned = [f"{m.measured:.0f} Hz of {t.test.id}" for t, m in every if unlike(m)]
         return f"{sentence}; but the shape measured at {_first(turned)} has nothing of the computed one (MAC below {UNLIKE:g})." if turned else f"{sentence}."
     alone = max((abs(m.residual) for _, m in every), default=0.0)
@@ -124,6 +127,18 @@ def verdict(c: Comparison) -> str:
     _, largest = far = max(alike, key=lambda row: abs(row[1].error))
     in_hertz = "" if largest is m else f"; in Hz it is {_mode(*far)} {_off(largest)}"
     return f"{sentence}; {'of the others ' if lost else ''}furthest off in standard errors is {_mode(t, m)} {_off(m)} ({abs(m.residual):.3g} standard errors){in_hertz}."
+
+
+def without_modes(c: Comparison) -> str:
+    """Where no mode was measured: that there is none to compare, and how alike FRFs are at least; else empty."""
+    if any(t.modes or t.missing for t in c.tests):
+        return ""
+    frfs = [t.correlation for t in c.tests if t.correlation is not None]
+    if not frfs:
+        return "no mode was measured, so there is none to compare"
+    low, high = min(f.whole.low for f in frfs), max(f.whole.high for f in frfs)
+    csac, csf = (float(np.mean([getattr(f.whole, name) for f in frfs])) for name in ("csac", "csf"))
+    return f"no mode was found in the measured FRFs between {low:.0f} and {high:.0f} Hz, so there is none to compare; FRFs are alike by {csac:.3f} in shape (CSAC) and {csf:.3f} with their size (CSF)"
 
 
 MOST = 0.5  # of the squares of all errors, from which what is the same at all conditions is most of them
@@ -200,7 +215,9 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
 
 
 def _show_modes(console: Console, c: Comparison) -> None:
-    """A row for every mode of every test."""
+    """A row for every mode of every test; nothing where there is none."""
+    if not any(t.modes for t in c.tests):
+        return
     columns = (
         "test", "mode", "kind", "measured\nHz", "+-", "computed\nHz", "error\nHz", "error\n%", "error\ns.e.",
         "damping\n%", "computed\n%", "error\ns.e.", "MAC",
@@ -217,7 +234,9 @@ def _show_modes(console: Console, c: Comparison) -> None:
             beside = (damping, f"{100 * m.damping_computed:.3f}", damping_error, mac)
             rows.append([name, str(m.number), m.kind, *frequencies, *error, *beside])
     show_grid(console, "Modes, computed - measured", columns, rows, ("test", "kind"), keys=3)
-    console.print("+-: standard error of the measured frequency, with what the test's temperature is uncertain by")
+    console.print(
+        f"+-: standard error of the measured frequency, with what the test's temperature is uncertain by and the model's numerical error of {1e6 * FREQUENCY_FLOOR:.0f} ppm", highlight=False
+    )
     _show_unsure(console, c)
     if any(m.close and m.mac is not None for t in c.tests for m in t.modes):
         console.print("* close modes: share of the measured shape in the plane of the computed ones")

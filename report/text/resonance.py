@@ -125,7 +125,7 @@ def sentences(found: ResonanceMap) -> list[str]:
     if not crossed:
         excited = [c for c in found.coincidences if c.strength > 0] or list(found.coincidences)
         apart = min(excited, key=lambda c: abs(c.margin), default=None)
-        near = f"; nearest is {_line(apart)}, {100 * apart.margin:+z.1f} % from {_mode(apart)}" if apart else ""
+        near = f"; nearest is {_line(apart)}, {100 * apart.margin:+z.{2 if abs(apart.margin) < 1e-3 else 1}f} % from {_mode(apart)}{_width(apart)}" if apart else ""
         return [f"This spindle at {rpm} crosses no line {_between(found)}{near}."]
     said = []
     for alike in _same_line(crossed):
@@ -133,6 +133,12 @@ def sentences(found: ResonanceMap) -> list[str]:
         meets = f"This spindle at {rpm} crosses {_line(c, [a.line.bearing for a in alike])} at {c.condition.temperature:.1f} C with {_mode(c)} at {c.frequency:.1f} Hz"
         said.append(f"{meets}; {_repeatable(found, alike) if c.repeats else _nonrepeatable(found, c)}.")
     return said
+
+
+def _width(c: Coincidence) -> str:
+    """That a line is within the half-power width of its mode, which it excites there as if it met it."""
+    ratio = c.mode.damping_ratio
+    return f", within its half-power width of +-{100 * ratio:.2g} %, where it is excited nearly as at a crossing" if abs(c.margin) <= ratio else ""
 
 
 def _between(found: ResonanceMap) -> str:

@@ -70,7 +70,16 @@ def _mode_json(point: OperatingPoint, mode: Mode) -> dict[str, Any]:
         "whirl": mode.whirl,
         "energy": group_energy(point.chain, mode),
         "energy_by_element": dict(mode.energy),
+        "shape": _shape_json(point, mode),
     }
+
+
+def _shape_json(point: OperatingPoint, mode: Mode) -> list[dict[str, Any]]:
+    """The shape at the measuring points in their directions, as FRFs show it: largest 1, turned so that what moves in phase is real; nothing where no point moves."""
+    seen = point.measurement.response_rows @ mode.shape
+    seen = seen * np.exp(-0.5j * np.angle(np.sum(seen**2)))
+    seen = seen / (seen[np.argmax(np.abs(seen.real))].real or 1.0) if len(seen) else seen
+    return [{"node": p.node, "name": p.name, "real": float(v.real), "imaginary": float(v.imag)} for p, v in zip(point.spindle.points, seen, strict=True)]
 
 
 def write_modes(point: OperatingPoint, folder: Path) -> None:

@@ -20,7 +20,7 @@ from typing import Any, SupportsIndex
 import numpy as np
 
 from thermospindle.model.bearing.pair import PairState
-from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
+from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange, absent
 from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.sim.effects.effect import HOOKS, Effect
 
@@ -99,7 +99,7 @@ def guarded(effect: Effect, where: str) -> OwnEffect:
 def effect_of(file: Path, where: str = "") -> OwnEffect:
     """The EFFECT of a Python file, called `where` in messages; `BadInput` where there is none, naming file and line. A file is run once until it is changed."""
     if not file.is_file():
-        raise BadInput(f"--effect {where or file}: no such file; it must be a Python file that defines EFFECT")
+        raise BadInput(f"--effect {where or file}: {absent(file)}; it must be a Python file that defines EFFECT")
     return _effect_of(file.resolve(), where or str(file), file.stat().st_mtime_ns)
 
 

@@ -20,12 +20,13 @@ NEARBY = 0.1  # of a speed, how far beyond those that are asked for crossings ar
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A mode over the grid: its number, kind and whirl at the nominal condition, `frequency` (T, S) in Hz, NaN where it was lost."""
+    """A mode over the grid: its number, kind, whirl and damping ratio at the nominal condition, `frequency` (T, S) in Hz, NaN where it was lost."""
 
     number: int
     kind: str
     whirl: str
     frequency: Array
+    damping_ratio: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ class Grid:
     def __init__(self, spindle: Spindle, nominal: Condition, multiples: int, highest: float, imperfections: Imperfections | None):
         self.spindle, self.nominal, self.multiples = spindle, nominal, multiples
         first = operating_point(spindle, nominal)
-        check_centred(first.state, "a resonance map")
+        check_centred(spindle, first.state, "a resonance map")
         self.ratio = speed_ratio(spindle)
         self.given, self.drawn_from = imperfections, None
         if imperfections is None and first.imperfections == Imperfections():
@@ -137,7 +137,7 @@ class Grid:
         samples = {which: line for e in self.every.values() for which, line in e.lines.items()} | dict(self.every[t0, s0].lines)
         amplitude = line_amplitudes(self.excited(self.every[t0, s0]))
         return (
-            tuple(Track(k, m.kind, m.whirl, tracks[k]) for k, m in self.first.items()),
+            tuple(Track(k, m.kind, m.whirl, tracks[k], m.damping_ratio) for k, m in self.first.items()),
             tuple(LineTrack(samples[which], along[which], amplitude.get(which, 0.0)) for which in keys),
         )
 

@@ -119,7 +119,7 @@ def chain_response(chain: RotorBase, forces: Harmonics, known: Callable[[], Pole
 
 def excitation(point: OperatingPoint, imperfections: Imperfections | None = None) -> Excitation:
     """All lines that a point's imperfections, or others in their place, excite, in order of frequency."""
-    check_centred(point.state, "what imperfections excite")
+    check_centred(point.spindle, point.state, "what imperfections excite")
     present = point.imperfections if imperfections is None else imperfections
     n = len(point.chain.dofs)
     parts: dict[Line, ComplexArray] = {}

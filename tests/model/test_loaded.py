@@ -249,7 +249,7 @@ def test_a_load_that_nothing_bears_is_refused() -> None:
 
 def test_balls_by_themselves_are_for_centred_rings(pair: Spindle) -> None:
     pushed, state = under(pair, (1.0, 0.0), 0.02)
-    with pytest.raises(BadInput, match="is for centred rings"):
+    with pytest.raises(BadInput, match=r"radial_load_N = \[1, 0\]: --element ball-by-ball is for centred rings"):
         mjcf.spec(pushed, state, "ball-by-ball")
     assert mjcf.spec(pushed, state, "linear").compile().nv > 0
 

@@ -171,6 +171,10 @@ def test_a_file_that_is_not_there_or_not_toml(tmp_path):
     with pytest.raises(BadInput, match="no scene there"):
         load(tmp_path)
     (tmp_path / "spindle.toml").mkdir()
+    for text in ("", "# all of it is comment\n"):
+        (tmp_path / "empty.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(BadInput, match=r"empty\.toml: has no keys: it is empty, or all of it is comment"):
+            load(tmp_path / "empty.toml")
     with pytest.raises(BadInput, match=r"spindle\.toml: is a folder; a scene's file is expected there$"):  # it was asked whether the same folder was meant
         load(tmp_path)
     (tmp_path / "spindle.toml").rmdir()

@@ -57,6 +57,16 @@ def test_the_folder(compared_folder):
         assert "<svg" in (compared_folder / f"{name}.svg").read_text(encoding="utf-8")
 
 
+def test_where_no_mode_was_found_the_folder_is_whole(spindle, quiet, tmp_path):
+    """Rerun takes no list of nothing whose type it is not told, and the verb ended in its words."""
+    write_comparison(quiet, spindle, tmp_path)
+    assert {p.stem for p in tmp_path.iterdir()} == {"report", "compare", "frfs", "bands", "channels", "fdac"}
+    log = read_log(tmp_path / "compare.rrd")
+    assert log.kind == "run"
+    assert log.peaks == ()
+    assert list(log.frfs) == [f"{t.test.id}{which}" for t in quiet.tests for which in ("", " computed")]
+
+
 def test_the_report_tells_every_mode(compared, compared_folder):
     text = (compared_folder / "report.html").read_text(encoding="utf-8")
     cells = Cells(text).cells

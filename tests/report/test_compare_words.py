@@ -49,6 +49,26 @@ def test_what_is_the_same_at_all_conditions_is_said_with_its_figures(compared, c
     assert constant_errors([cold]) is None
 
 
+def test_where_no_mode_was_found_frfs_alone_are_told(quiet, capsys):
+    """It did not agree, by infinitely many standard errors, above a table of no rows."""
+    assert [t.modes for t in quiet.tests] == [(), ()]
+    whole = [t.correlation.whole for t in quiet.tests]
+    said = (
+        f"hdd_2003: no mode was found in the measured FRFs between {whole[0].low:.0f} and {whole[0].high:.0f} Hz, so there is none to compare; "
+        f"FRFs are alike by {np.mean([w.csac for w in whole]):.3f} in shape (CSAC) and {np.mean([w.csf for w in whole]):.3f} with their size (CSF)"
+    )
+    show_comparison(Console(width=2000), quiet)
+    told = capsys.readouterr().out
+    assert said in told
+    assert "computed - measured" not in told
+    assert comparison_json(quiet)["rms_pull"] is None
+    page = "".join(str(section) for section in sections(quiet))
+    assert said.removeprefix("hdd_2003: ") in page
+    assert "standard errors" not in page
+    nothing = replace(quiet, tests=tuple(replace(t, correlation=None) for t in quiet.tests))
+    assert verdict(nothing) == "hdd_2003: no mode was measured, so there is none to compare."
+
+
 def test_errors_that_hang_together_are_told(compared):
     """Where every mode by itself is within what its test's temperature may do, and all of them at once are not, no mode is called the worst."""
     largest = max(abs(m.residual) for t in compared.tests for m in t.modes)

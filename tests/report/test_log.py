@@ -312,7 +312,7 @@ def ours_without_content(path: Path) -> None:
         pytest.param(lambda path: None, "no such file", id="missing"),
         pytest.param(lambda path: path.mkdir(), "is a folder; a log is a file, *.rrd: none is in it", id="folder"),
         pytest.param(lambda path: path.write_bytes(b""), "not a Rerun log that can be read", id="empty"),
-        pytest.param(lambda path: path.write_text("frequency,level\n1,2\n"), "not a Rerun log that can be read", id="text"),
+        pytest.param(lambda path: path.write_text("frequency,level\n1,2\n"), "other.rrd: not a Rerun log", id="text"),
         pytest.param(foreign, "is a recording of 'another_program', not of 'thermospindle'", id="foreign"),
         pytest.param(ours_without_content, "not a whole log of thermospindle", id="nothing in it"),
     ],

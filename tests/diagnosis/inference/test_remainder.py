@@ -16,7 +16,7 @@ from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
-from thermospindle.diagnosis.inference.remainder import by_frequency
+from thermospindle.diagnosis.inference.remainder import by_frequency, light_resonance
 from thermospindle.diagnosis.inference.resonance import _centred, _resonates, moving, shown, with_resonance
 from thermospindle.diagnosis.parameters.nuisance import RESONANCE, STIFFNESS_DRIFT, Resonance
 from thermospindle.diagnosis.verdict import diagnose
@@ -208,6 +208,17 @@ def test_the_verdict_of_one_that_moves_is_that_it_is_unknown(spindle):
     found = diagnose(spindle, made)
     assert found.verdict.word == "unexplained"
     assert re.search(r"a light resonance that the drawing lacks would have to move from 16[45]\d Hz at 20 C to 14[45]\d Hz at 60 C", found.verdict.reason)
+
+
+def test_below_all_modes_there_is_no_resonance_and_a_verdict(spindle):
+    """A light one is felt through the modes in the band: where there was none, its products were no table that could be turned."""
+    below = np.arange(400.0, 515.0, 4.0)
+    quiet = virtual_campaign(spindle, TESTS, 2, errors=drawn(spindle, 3, 2), responses=(1, 3, 6), frequency=below)
+    model = model_of(spindle, quiet)
+    assert model.reference.seen == 0
+    alone = fit(model)
+    assert light_resonance(model, alone, evidence(model, alone).learned) is None
+    assert diagnose(spindle, quiet).verdict.word == "none"
 
 
 @pytest.mark.parametrize("settles", [True, False])

@@ -239,6 +239,8 @@ def test_a_file_that_does_not_run_names_its_line(refused, old, new, said):
 
 def test_no_effect_in_a_file(refused, tmp_path):
     assert "defines no EFFECT" in refused("x = 1\n")
+    with pytest.raises(BadInput, match="it is a folder; it must be a Python file that defines EFFECT"):
+        own_effects([tmp_path])
     with pytest.raises(BadInput, match=r"--effect nowhere\.py: no such file"):
         own_effects([Path("nowhere.py")])
     other = tmp_path / "other.py"

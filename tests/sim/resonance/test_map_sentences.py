@@ -152,6 +152,11 @@ def test_help_says_which_speeds_are_mapped(capsys):
 def test_sentence_without_a_crossing(spindle):
     near = resonance_map(spindle, [20.0, 22.0], [7000 * RPM, 7300 * RPM], NOMINAL)
     assert "crosses no line between 20 and 22 C; nearest is 20 (fo-fc)" in sentences(near)[0]
+    assert "half-power" not in sentences(near)[0]
+    damped = [replace(c, margin=-0.00049, mode=replace(c.mode, damping_ratio=0.003)) for c in near.coincidences]
+    told = sentences(replace(near, coincidences=tuple(damped)))[0]  # it was nearest by +0.0 %
+    assert ", -0.05 % from mode" in told
+    assert told.endswith(", within its half-power width of +-0.3 %, where it is excited nearly as at a crossing.")
 
 
 def test_many_crossings_are_told_by_the_strongest_and_a_number(met):
