@@ -17,7 +17,7 @@ from functools import cache, lru_cache, reduce
 from itertools import zip_longest
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array, lil_array
+from scipy.sparse import csr_array
 from scipy.special import logsumexp
 
 from thermospindle.diagnosis.forward.model import CampaignModel
@@ -164,9 +164,8 @@ def amplitudes_apart(fit: Fit) -> csr_array:
     What a shape parameter moves at the fitted sizes is in proportion to these: to a quadratic it could stand in for them, and for their law over the
     tests, which of its own it has not. So with each, the size in every test gives way by what it would change of the amount: sizes' part of its column.
     """
-    if not any(m.own_law and m.shape for m in fit.mechanisms):
-        return csr_array(eye_array(len(fit.point)))
-    turn, at = lil_array(eye_array(len(fit.point))), len(fit.nuisance)
+    every, at = np.arange(len(fit.point)), len(fit.nuisance)
+    rows, columns, values = [every], [every], [np.asarray(np.ones(len(every)), float)]
     for m, root in zip(fit.mechanisms, fit.roots, strict=True):
         tests, shapes = len(root), slice(at + len(root), at + len(root) + len(m.shape))
         if m.own_law and m.shape:
@@ -175,9 +174,11 @@ def amplitudes_apart(fit: Fit) -> csr_array:
                 own = information[at + t, at + t]
                 if own > 0:
                     amounts[t] = root[t, t] * information[at + t, shapes] / own
-            turn[at : at + tests, shapes] = -np.linalg.solve(root, amounts)
+            rows.append(np.repeat(every[at : at + tests], len(m.shape)))
+            columns.append(np.tile(every[shapes], tests))
+            values.append(np.asarray(-np.linalg.solve(root, amounts).ravel(), float))
         at = shapes.stop
-    return csr_array(turn)
+    return csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (len(every),) * 2)
 
 
 def at_one_size(fit: Fit) -> Sequence[tuple[float, Array, Array]]:

@@ -191,6 +191,8 @@ def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, floa
 def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
     """Whether a mechanism would need sizes (tests,) that it cannot have: whether those that it can lie farther from them, all tests taken together, than `CANNOT` standard errors of one are by
     chance, were the truth at the limit: chi-bar-squared, of as many independent tests as there are (Silvapulle & Sen, *Constrained Statistical Inference*, 2005, Eq. 3.5). What is alike in all tests may be a build tolerance's as well, and a size that is off by that is not told by one test's standard error."""
+    if m.size.limits[0] <= sizes.min() and sizes.max() <= m.size.limits[1]:
+        return False
     variance, along = np.linalg.eigh(covariance)
     known = (TINY * m.size.prior_sd) ** 2  # rounding may leave a variance below nothing
     whitened = along.T / np.sqrt(np.maximum(variance, max(TINY * float(variance.sum()), known)))[:, None]

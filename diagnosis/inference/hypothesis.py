@@ -121,8 +121,9 @@ def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, 
     return problem.start({}), *(problem.start({k: sizes}) for k, sizes, (low, high) in scanned if low <= sizes.min() and sizes.max() <= high)
 
 
-def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
-    """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is.
+def settled(model: CampaignModel, h: Hypothesis, best: float = -np.inf) -> Hypothesis:
+    """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is. What is more than `PLENTY` behind the `best` ln evidence, and comes
+    no nearer, need not stand there exactly, and is fitted anew once.
 
     It starts from its own answer, or from the fit where the model is no quadratic as far as that, without what was learned to be nothing. What ends with less evidence than the quadratic promised
     may have stalled on that way, whatever it costs at first, and is fitted from the other start too.
@@ -134,6 +135,9 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
         try:
             problem = Problem(model, h.mechanisms, before.learned, h.fit.moved)
             near, far = sorted((before.mean, problem.within_prior(h.fit.point)), key=lambda at: problem.cost(at, TEMPERS[-1]))
+            behind = best - PLENTY - before.ln
+            promised = before.chi2 / before.learned.errors**2 + float(before.mean @ problem.precision @ before.mean)
+            refit = partial(refit, beaten=promised - 2 * behind if behind > 0.0 else np.inf)
             found = refit(start=near)
             told = evidence(model, found, wide=wide)
             if told.ln < before.ln - LITTLE:
@@ -144,7 +148,7 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
         if told.rounded:
             return h
         h = Hypothesis(found, told)
-        if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE:
+        if (h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE) or h.evidence.ln < best - PLENTY:
             break
     return h
 

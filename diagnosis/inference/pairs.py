@@ -44,7 +44,8 @@ def joined(
     """The best single mechanisms with every other one that promises to gain beside them, and what promises to gain beside the best two."""
     ranked = of_each_name(singles)
     gains = [h for h in ranked if h.evidence.ln > none.evidence.ln + LITTLE]
-    leads = [h for h in gains if not h.free and h.evidence.ln > gains[0].evidence.ln - CLOSE][:LEADS] or [h for h in gains if not h.free][:1]
+    near = CLOSE if gains and strained(gains[0]) else OCCAM  # what leaves nothing is beaten by what another leads to if at all by its own prior alone
+    leads = [h for h in gains if not h.free and h.evidence.ln > gains[0].evidence.ln - near][:LEADS] or [h for h in gains if not h.free][:1]
     if leads and (leads[0] is not gains[0] or leads[0].evidence.learned.errors > 1.0):
         leads += [h for h in gains if h.free][:1]  # two things that drift, or one beside an effect: where one of the catalogue does not do
     pairs = _beside(model, leads, mechanisms, most, expected, workers)

@@ -98,8 +98,7 @@ def search(
     found = better([*found, *exchanged(model, found, tried, workers)])
     progress("pairs fitted")
     finalists = _finalists(found)
-    least = max((h.evidence.ln for h in found), default=-np.inf) - FAR
-    none, *ended = _ended(model, least, [none, *finalists], workers)
+    none, *ended = _ended(model, max((h.evidence.ln for h in found), default=-np.inf), [none, *finalists], workers)
     none = _without_what_does_nothing(model, none, ended)
     anew = dict(zip(map(id, finalists), ended, strict=True))
     ranked = [anew.get(id(h), h) for h in found]
@@ -131,18 +130,18 @@ def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Se
     return max(none, found, key=lambda h: h.evidence.ln)
 
 
-def _ended(model: CampaignModel, least: float, found: Sequence[Hypothesis], workers: int | None) -> list[Hypothesis]:
-    """Each fitted anew, with the very mechanisms that it has here."""
-    ended = in_parallel(partial(_at_the_end, model, least), found, workers)
+def _ended(model: CampaignModel, best: float, found: Sequence[Hypothesis], workers: int | None) -> list[Hypothesis]:
+    """Each fitted anew, with the very mechanisms that it has here, beside the `best` ln evidence so far."""
+    ended = in_parallel(partial(_at_the_end, model, best), found, workers)
     return [replace(e, fit=replace(e.fit, mechanisms=h.mechanisms)) for e, h in zip(ended, found, strict=True)]
 
 
-def _at_the_end(model: CampaignModel, least: float, h: Hypothesis) -> Hypothesis:
+def _at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:
     if h.mechanisms:  # without any it is settled
-        h = settled(model, h)
+        h = settled(model, h, best)
         if not h.free and any(m.shape for m in h.mechanisms) and farthest_tolerance(model, h.fit.point) > STRAINED:
             h = _from_the_drawing(model, h)
-    return widened(model, h, least)
+    return widened(model, h, best - FAR)
 
 
 def _from_the_drawing(model: CampaignModel, h: Hypothesis) -> Hypothesis:
