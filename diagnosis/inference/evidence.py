@@ -165,7 +165,8 @@ def amplitudes_apart(fit: Fit) -> csr_array:
     tests, which of its own it has not. So with each, the size in every test gives way by what it would change of the amount: sizes' part of its column.
     """
     every, at = np.arange(len(fit.point)), len(fit.nuisance)
-    rows, columns, values = [every], [every], [np.asarray(np.ones(len(every)), float)]
+    rows, columns = [every], [every]
+    values: list[Array] = [np.ones(len(every))]
     for m, root in zip(fit.mechanisms, fit.roots, strict=True):
         tests, shapes = len(root), slice(at + len(root), at + len(root) + len(m.shape))
         if m.own_law and m.shape:
