@@ -58,6 +58,11 @@ class Mode:
         return abs(self.pole.imag) / (2 * np.pi)
 
 
+def to_real(shape: ComplexArray) -> complex:
+    """The factor of size one by which the parts of a shape (n,) that move in phase are real."""
+    return complex(np.exp(-0.5j * np.angle(np.sum(shape**2))))
+
+
 @dataclass(frozen=True, eq=False)
 class Block:
     """Degrees of freedom that move by themselves: their numbers (m,) of n, vectors (2m, 2m) of the state (q, q'), and M^-1 (m, m)."""

@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
 from thermospindle.diagnosis.compare.correlation import Band, Correlation, Pair
+from thermospindle.model.rotor.modes import to_real
 from thermospindle.model.types import Array
 from thermospindle.model.units import MM
 from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour, label, residual_bar, residual_norm
@@ -110,7 +111,7 @@ def shapes(c: Comparison) -> Figure:
         if own is None:
             axes.set_axis_off()
             continue
-        turn = np.exp(-0.5j * np.angle(np.sum(own.measured**2)))  # what moves in phase is real
+        turn = to_real(own.measured)
         measured, computed = ((shape * turn).real[order] for shape in (own.measured, own.computed))
         axes.plot(at, computed, color=INK, lw=0.9, marker="_", ms=9, mew=1.2, ls=(0, (4, 2)) if along else "none")
         axes.errorbar(at, measured, own.sd[order], color=MEASURED, fmt="o", ms=3.5, lw=0.9, capsize=1.5)

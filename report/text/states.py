@@ -15,7 +15,7 @@ from thermospindle.model.errors import listed
 from thermospindle.model.files.stiffness_table import BETWEEN, FURTHER, PRESSURE, StiffnessTable
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS
 from thermospindle.model.rotor import mjcf
-from thermospindle.model.rotor.modes import Mode, group_energy
+from thermospindle.model.rotor.modes import Mode, group_energy, to_real
 from thermospindle.model.rotor.static import Around, Static
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
@@ -77,7 +77,7 @@ def _mode_json(point: OperatingPoint, mode: Mode) -> dict[str, Any]:
 def _shape_json(point: OperatingPoint, mode: Mode) -> list[dict[str, Any]]:
     """The shape at the measuring points in their directions, as FRFs show it: largest 1, turned so that what moves in phase is real; nothing where no point moves."""
     seen = point.measurement.response_rows @ mode.shape
-    seen = seen * np.exp(-0.5j * np.angle(np.sum(seen**2)))
+    seen = seen * to_real(seen)
     seen = seen / (seen[np.argmax(np.abs(seen.real))].real or 1.0) if len(seen) else seen
     return [{"node": p.node, "name": p.name, "real": float(v.real), "imaginary": float(v.imag)} for p, v in zip(point.spindle.points, seen, strict=True)]
 
