@@ -62,8 +62,7 @@ def free_forms(spindle: Spindle, reference: Condition | None = None) -> list[Mec
         found.append(_form(f"{name} damping", "%", DAMPING_WIDTH, chain=_scaled(elements, range(0), damping_too=True, damping_only=True)))
     for name, bodies in [(s.name, s.bodies) for s in shafts if s.turns] + [(b.name, (b.name,)) for b in spindle.structure.rigid_bodies if b.turns]:
         found.append(_form(f"{name} mass", "%", MASS_WIDTH, chain=_heavier(bodies, whole=True)))
-        if len(bodies) == 1:
-            found.append(_form(f"{name} transverse inertia", "%", MASS_WIDTH, chain=_heavier(bodies, whole=False)))
+        found.append(_form(f"{name} transverse inertia", "%", MASS_WIDTH, chain=_heavier(bodies, whole=False)))
     names = [b.name for b in spindle.bearings]
     sets = [("bearings", names), *([(name, [name]) for name in names] if len(names) > 1 else [])]
     for label, own in sets:
@@ -82,15 +81,19 @@ def free_forms(spindle: Spindle, reference: Condition | None = None) -> list[Mec
 
 
 def _tied(spindle: Spindle) -> list[Mechanism]:
-    """A spring between the ground and what turns: a seal that rubs, a hose, a tool that touches; one that pushes away is a magnet's (Earnshaw)."""
+    """A spring between the ground and what turns: a seal that rubs, a hose, a tool that touches; one that pushes away is a magnet's (Earnshaw). It holds the middle, and across the
+    axis a shaft at any of its measuring points."""
     if not any(b.turns for b in spindle.structure.bodies):
         return []
     low, high = spindle.hammer.band
     rotor = spindle.turning
-    name = next((s.name for s in spindle.structure.shafts if rotor.name in s.bodies), rotor.name)
+    shaft = next((s for s in spindle.structure.shafts if rotor.name in s.bodies), None)
+    places = {p.body: p.name for p in reversed(spindle.points) if shaft and p.body in shaft.bodies and p.body != rotor.name}
     width = TIE_WIDTH * spindle.turning_mass * HERTZ**2 * low * high / TO_UM
-    ways = (("", (0, 1, 2)), (" across the axis", (0, 1)), (" along the axis", (2,)))
-    return [_form(f"spring from {name} to ground{label}", "N/um", width, chain=_tie(rotor, moves)) for label, moves in ways]
+    ways: list[tuple[str, Body, tuple[int, ...]]] = [("", rotor, (0, 1, 2)), (" across the axis", rotor, (0, 1)), (" along the axis", rotor, (2,))]
+    ways += [(f" across the axis at {name}", spindle.structure.body(body), (0, 1)) for body, name in reversed(places.items())]
+    named = shaft.name if shaft else rotor.name
+    return [_form(f"spring from {named} to ground{label}", "N/um", width, chain=_tie(at, moves)) for label, at, moves in ways]
 
 
 def _form(name: str, unit: str, width: float, **hooks: Any) -> Mechanism:

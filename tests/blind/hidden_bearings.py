@@ -128,5 +128,10 @@ def _pull(spindle: Spindle, amount: float, chain: RotorBase) -> RotorBase:
     own = [e for e in chain.elements if e.group == "bearings"]
     k = -amount / 100 * own[0].stiffness[0, 0]
     z = float(np.mean([e.z for e in own]))
-    pull = Element("pull", "pull", own[0].a, own[0].b, z, np.diag([k, k, 0.0, 0.0, 0.0]), np.zeros((5, 5)))
+    turns = next(name for name in (own[0].a, own[0].b) if spindle.structure.body(name).turns)
+    stands = own[0].a if turns == own[0].b else own[0].b
+    if spindle.structure.shafts:  # on the shaft's node there, not at the end of an arm from the first bearing's
+        node = min((b for b in chain.bodies if b.turns), key=lambda b: abs(b.z - z))
+        turns, z = node.name, node.z
+    pull = Element("pull", "pull", stands, turns, z, np.diag([k, k, 0.0, 0.0, 0.0]), np.zeros((5, 5)))
     return replace(chain, elements=(*chain.elements, pull))

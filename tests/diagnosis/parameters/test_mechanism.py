@@ -250,9 +250,42 @@ def test_what_turns_may_be_held_from_outside(spindle, label, moves):
         assert np.array_equal(held.linear.damping, plain.linear.damping)
 
 
-def test_of_a_flexible_shaft_the_whole_drifts():
-    assert "spring from spindle to ground" in [m.name for m in free_forms(load(ROOT / "scenes" / "five_bearing"))]
-    assert [m.name for m in free_forms(load(ROOT / "scenes" / "five_bearing")) if "mass" in m.name or "inertia" in m.name] == ["spindle mass"]
+@pytest.fixture(scope="module")
+def machine_tool():
+    return load(ROOT / "scenes" / "five_bearing")
+
+
+def test_of_a_flexible_shaft_the_whole_drifts(machine_tool):
+    names = [m.name for m in free_forms(machine_tool)]
+    assert [n for n in names if "mass" in n or "inertia" in n] == ["spindle mass", "spindle transverse inertia"]
+    assert [n.removeprefix("spring from spindle to ground") for n in names if n.startswith("spring")] == [
+        "", " across the axis", " along the axis", *(f" across the axis at {place}" for place in ("nose", "flange", "middle", "end")),
+    ]  # fmt: skip
+
+
+def test_a_flexible_shaft_that_is_harder_to_tilt_is_a_drawing_whose_sections_are(machine_tool):
+    m, f = next(m for m in free_forms(machine_tool) if m.name == "spindle transverse inertia"), np.exp(0.1)
+    bodies = tuple(
+        replace(b, inertia=(f * b.inertia[0], f * b.inertia[1], b.inertia[2])) if b.turns else b for b in machine_tool.structure.bodies
+    )
+    at = Condition(20.0, 4000 * RPM)
+    drawn = operating_point(replace(machine_tool, structure=replace(machine_tool.structure, bodies=bodies)), at, ())
+    drifted = operating_point(machine_tool, at, [(m.effect, m.values(10.0, []))])
+    assert [m.frequency for m in drifted.modes] == pytest.approx([m.frequency for m in drawn.modes], rel=1e-9)
+    lower = [b.frequency - a.frequency for a, b in zip(drifted.modes, operating_point(machine_tool, at, ()).modes, strict=True)]
+    assert min(lower) > -1e-6  # not at all of the axial ones
+    assert max(lower) > 1.0
+
+
+def test_a_flexible_shaft_may_be_held_where_it_is_measured(machine_tool):
+    """Across the axis, at the node that the sensor sits on."""
+    m = next(m for m in free_forms(machine_tool) if m.name == "spring from spindle to ground across the axis at end")
+    plain = operating_point(machine_tool, Condition(20.0, 4000 * RPM), ())
+    end = machine_tool.structure.body(next(p.body for p in machine_tool.points if p.name == "end"))
+    rows = motion_rows(plain.chain, end.name, [0.0, 0.0, end.z])[:2]
+    held = operating_point(machine_tool, Condition(20.0, 4000 * RPM), [(m.effect, m.values(-2.0, []))])
+    change = held.linear.stiffness - plain.linear.stiffness
+    assert change == pytest.approx(-2e6 * rows.T @ rows, abs=1e-9 * np.abs(plain.linear.stiffness).max())
 
 
 @pytest.mark.parametrize("name", ["preload_loss", "lubricant_film", "thermal_gradient"])
