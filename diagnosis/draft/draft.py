@@ -57,7 +57,8 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
 
 def _fits(best: Fitted) -> tuple[str, bool]:
     if not best.tested:
-        return f"{best.count} parameters fit {best.tests} tests whatever they are: that it is this law is not tested", True
+        what = {(True, False): "temperatures", (False, True): "speeds"}.get(best.law.asks, "tests") if best.places < best.tests else "tests"
+        return f"{best.count} parameters fit {best.places} {what} whatever changes over them: that it is this law is not tested", True
     misses = ": no law here fits, this one least badly" if best.refuted else ""
     return f"chi2 {best.chi2:.3g} of {best.tests} tests with {best.count} parameters{misses}", bool(best.refuted)
 

@@ -1,8 +1,8 @@
 """The simple laws that physics has over temperature T and speed n, and how each fits what drifts.
 
-None, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there
+None, linear, power, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there
 everywhere beside it, weighted by the covariance over the tests; the Bayesian information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with
-as many parameters as tests fits whatever they are: it is taken where chi2 rules all others out, and the file says that it is not tested.
+as many parameters as it has temperatures, speeds, or pairs of these fits whatever changes over them: it is taken where chi2 rules all others out, and the file says that it is not tested.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from thermospindle.model.types import Array
 REFERENCE = 20.0  # C from which laws count temperature, where a diagnosis does not tell its scene's reference
 REFUTED = 1e-3  # chance of a chi2 as large, below which a law is ruled out
 SCALE = ("scale", "K", 20.0, (3.0, 200.0))
+POWER = ("power", "1", 1.0, (0.2, 4.0))
 ACTIVATION = ("activation", "K", 4000.0, (300.0, 20000.0))
 KELVIN = 273.15
 
@@ -37,12 +38,18 @@ class Law:
     has_offset: bool = False
 
     @property
+    def asks(self) -> tuple[bool, bool]:
+        """Whether it depends on temperature, and on speed."""
+        names = compile(self.expression, "law", "eval").co_names
+        return "T" in names, "n" in names
+
+    @property
     def is_step(self) -> bool:
         """Between two tests: nothing tells where."""
         return self.expression.startswith("where")
 
     def __call__(self, temperature: Array, share: Array, values: Any) -> Array:
-        names = {"T": temperature, "n": share, "exp": np.exp, "where": np.where, **{s[0]: v for s, v in zip(self.shape, values, strict=True)}}
+        names = {"T": temperature, "n": share, "exp": np.exp, "where": np.where, "max": np.maximum, **{s[0]: v for s, v in zip(self.shape, values, strict=True)}}
         return np.broadcast_to(np.asarray(eval(self.expression, {"__builtins__": {}}, names), float), temperature.shape)  # the text is one of ours, above
 
 
@@ -53,6 +60,7 @@ def of_temperature(reference: float, hottest: float) -> tuple[Law, ...]:
     exponential, arrhenius = f"exp(({reference - hottest:.6g}) / scale)", f"exp(activation * (1 / {hot} - 1 / {cold}))"
     return (
         Law("linear in temperature", f"({from_reference}) / 40"),
+        Law("power of temperature", f"max(({from_reference}) / {hottest - reference:.6g}, 0.0) ** power", (POWER,)),
         Law("exponential in temperature", f"(exp(({from_hottest}) / scale) - {exponential}) / (1 - {exponential})", (SCALE,)),
         Law("Arrhenius", f"(exp(activation * (1 / {hot} - 1 / (T + 273.15))) - {arrhenius}) / (1 - {arrhenius})", (ACTIVATION,)),
         Law("sigmoid in temperature", "1 / (1 + exp((middle - T) / width))", (("middle", "C", 40.0, (-40.0, 200.0)), ("width", "K", 4.0, (0.5, 40.0)))),
@@ -73,7 +81,7 @@ def _less(temperature: float) -> str:
     return f"T {'-' if temperature >= 0 else '+'} {abs(temperature):.6g}"
 
 
-OF_SPEED = (Law("linear in speed", "n"), Law("power of speed", "n ** power", (("power", "1", 1.0, (0.2, 4.0)),)))
+OF_SPEED = (Law("linear in speed", "n"), Law("power of speed", "n ** power", (POWER,)))
 
 
 def laws(temperature: Array, share: Array, reference: float = REFERENCE) -> list[Law]:
@@ -84,26 +92,29 @@ def laws(temperature: Array, share: Array, reference: float = REFERENCE) -> list
     speed = OF_SPEED if np.ptp(share) > 0 else ()
     found += [*thermal, *speed]
     if thermal and speed:
-        found += of_both(reference, hottest)
-        found += [Law(f"{t.name} and linear in speed", f"{t.expression} + of_speed * n", (*t.shape, ("of_speed", "1", 0.0, (-20.0, 20.0)))) for t in thermal[:4]]
+        told = [law for law in (*of_both(reference, hottest), *thermal) if len(law.shape) + 1 < len(np.unique(temperature))]  # beside speed too
+        found += [law for law in told if law.asks[1]]
+        found += [Law(f"{t.name} and linear in speed", f"{t.expression} + of_speed * n", (*t.shape, ("of_speed", "1", 0.0, (-20.0, 20.0)))) for t in told if not (t.asks[1] or t.is_step)]
     return found + [replace(law, name=f"{law.name}, and a constant", has_offset=True) for law in found[1:]]
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A law fitted: `size`, `offset` (in sizes; 0 of a law without) and shape values with standard errors; chi2 in how many `tests`, and the number of parameters."""
+    """A law fitted: `size`, `offset` (in sizes; 0 of a law without) and shape values with standard errors; chi2 in how many `tests`, in which what it depends on has so many different `places`, and
+    the number of parameters."""
 
     law: Law
     values: Array  # size, offset, shape...
     sd: Array
     chi2: float
     tests: int
+    places: int
     count: int
 
     @property
     def tested(self) -> bool:
-        """Whether there are more tests than parameters: else a law fits whatever the tests are."""
-        return self.count < self.tests
+        """Whether there are more tests than parameters, and more places: else a law fits whatever changes from one to the other."""
+        return self.count < self.tests and (self.count < self.places or not any(self.law.asks))
 
     @property
     def criterion(self) -> float:
@@ -121,7 +132,8 @@ def fit_law(law: Law, temperature: Array, share: Array, change: Array, white: Ar
     `white` (n, n) makes errors of `change` (n,) independent and of unit variance."""
     offset = law.has_offset
     count = 1 + offset + len(law.shape)
-    if count > len(change):
+    places = len(np.unique(np.stack([temperature * law.asks[0], share * law.asks[1]]), axis=1).T)
+    if count > (places if any(law.asks) else len(change)):
         return None
     best: Fitted | None = None
     for begin in _starts(law, temperature):
@@ -140,7 +152,7 @@ def fit_law(law: Law, temperature: Array, share: Array, change: Array, white: Ar
         squares = float(residual @ residual)
         if amplitude[0] != 0.0 and (best is None or squares < best.chi2):
             values = np.array([amplitude[0], amplitude[1] / amplitude[0] if offset else 0.0, *shape])
-            best = Fitted(law, values, _errors(law, values, offset, temperature, share, white), squares, len(change), count)
+            best = Fitted(law, values, _errors(law, values, offset, temperature, share, white), squares, len(change), places, count)
     return best
 
 
