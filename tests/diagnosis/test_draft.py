@@ -91,6 +91,18 @@ def test_tests_of_one_temperature_are_one_place_of_a_law_of_temperature():
     assert beyond == pytest.approx([0.0, 0.75**0.72], abs=0.02)
 
 
+def test_a_shape_that_the_tests_do_not_tell_is_said_to_be_none(tmp_path):
+    """Nothing at 20 and 30 C, much at 50 and more at 60: how steep a sigmoid is between 30 and 50 no test says (it was drafted with +- 32000 K)."""
+    text, own, law = drafted(of_rings(tmp_path, [0.0, 0.0, 0.0, 4.78, 7.68], 0.4, (20.0, 20.0, 30.0, 50.0, 60.0)), tmp_path)
+    assert own.title.endswith("sigmoid in temperature")
+    assert " K (not told by these tests)." in text
+    assert "shape of the law, not told by these tests" in text
+    assert "+- 3" not in text.split("Rivals")[0]
+    sure = draft(of_rings(tmp_path, [0.0, 0.1, 0.5, 1.5, 1.9, 2.0], 0.01, AT), "own").text
+    assert "width 4" in sure.split("Rivals")[0]
+    assert "not told" not in sure
+
+
 AT = (20.0, 30.0, 40.0, 50.0, 60.0, 70.0)
 
 
