@@ -93,7 +93,7 @@ def test_tests_of_one_temperature_are_one_place_of_a_law_of_temperature():
 
 def test_a_shape_that_the_tests_do_not_tell_is_said_to_be_none(tmp_path):
     """Nothing at 20 and 30 C, much at 50 and more at 60: how steep a sigmoid is between 30 and 50 no test says (it was drafted with +- 32000 K)."""
-    text, own, law = drafted(of_rings(tmp_path, [0.0, 0.0, 0.0, 4.78, 7.68], 0.4, (20.0, 20.0, 30.0, 50.0, 60.0)), tmp_path)
+    text, own, _ = drafted(of_rings(tmp_path, [0.0, 0.0, 0.0, 4.78, 7.68], 0.4, (20.0, 20.0, 30.0, 50.0, 60.0)), tmp_path)
     assert own.title.endswith("sigmoid in temperature")
     assert " K (not told by these tests)." in text
     assert "shape of the law, not told by these tests" in text
