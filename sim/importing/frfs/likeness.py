@@ -2,7 +2,8 @@
 
 A model is never right, and none of this is refused. A factor is told where every FRF of a channel has it in the median over the louder half of its lines, the other sign where
 the phases of all are across from the computed ones there; two channels where each fits the other's computed FRFs at least `BETTER` times as well as its own, in rms of ln
-magnitude about the median, which no factor changes; lines in rad/s for Hz where the FRFs of all tests fit the computed ones so much better there.
+magnitude about the median, which no factor changes; lines in rad/s for Hz where the FRFs of all tests fit the computed ones so much better there. What all tests together do not tell,
+each may by itself: a sensor that was glued on again between two, or one export in another unit.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
+from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange, listed
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.beside import beside, check_points
@@ -26,6 +27,9 @@ FACTORS = {
     1 / 9.80665: "g told as m/s2",
 }
 """Measured over computed, and the mistake in a unit that makes it."""
+LARGE, ENDLESS, ALIKE = float(np.log(10**0.5)), float(np.log(1e7)), 0.25
+"""Of ln ratio, from which (10 dB) any other factor is told where all FRFs have it, no mass being drawn so wrong; from which none is, for an FRF that symmetry forbids is computed as 1e-12; and within
+which part of it they have the same."""
 WITHIN, SCATTER = 0.15, 1.0
 """Relative, of a factor; and of ln ratio over the lines of an FRF, its median deviation up to which it is one."""
 SILENT = 1e-2
@@ -72,13 +76,23 @@ def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
     except (BadInput, NoEquilibrium, OutsideRange) as error:
         return [f"the FRFs are not set beside those of {spindle.name}: {error}"]
     names = {p.node: f"{p.node} ({p.name})" for p in campaign.points}
-    exchanged = _swapped(tests, names, spindle.name)  # beside another's FRFs, factors and signs say nothing
-    return exchanged or [*_factors(tests, names, spindle.name), *_reversed(tests, names, spindle.name)]
+    if said := _mistaken([*tests.values()], names, spindle.name):
+        return said
+    of_one: dict[str, list[str]] = {}
+    for test, pairs in tests.items():
+        for sentence in _mistaken([pairs], names, spindle.name):
+            of_one.setdefault(sentence, []).append(test)
+    return [f"test{'s' * (len(ids) > 1)} {listed(ids)}: {sentence}" for sentence, ids in of_one.items()]
 
 
-def _tests(spindle: Spindle, campaign: Campaign, scale: float = 1.0) -> list[list[Pair]]:
+def _mistaken(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
+    """What some tests, all alike, tell of channels, units and signs; beside another channel's FRFs factors and signs say nothing."""
+    return _swapped(tests, names, scene) or [*_factors(tests, names, scene), *_reversed(tests, names, scene)]
+
+
+def _tests(spindle: Spindle, campaign: Campaign, scale: float = 1.0) -> dict[str, list[Pair]]:
     """The FRFs of every test that has some, its lines taken `scale` times as high as they are told."""
-    return [pairs for t in campaign.tests if (pairs := _pairs(spindle, campaign, t, scale))]
+    return {t.id: pairs for t in campaign.tests if (pairs := _pairs(spindle, campaign, t, scale))}
 
 
 def _pairs(spindle: Spindle, campaign: Campaign, test: Test, scale: float) -> list[Pair]:
@@ -105,13 +119,13 @@ def _pairs(spindle: Spindle, campaign: Campaign, test: Test, scale: float) -> li
 # ---------------------------------------------------------------- lines in another unit
 
 
-def _axis(spindle: Spindle, campaign: Campaign, tests: Sequence[Sequence[Pair]]) -> str | None:
+def _axis(spindle: Spindle, campaign: Campaign, tests: Mapping[str, Sequence[Pair]]) -> str | None:
     """What is said where the FRFs of all tests together fit the scene far better with their lines in another unit."""
-    told = _misfit([p for pairs in tests for p in pairs if p.loud])
+    told = _misfit([p for pairs in tests.values() for p in pairs if p.loud])
     if not SCATTER < told < float("inf"):
         return None
     for scale, mistake in AXES.items():
-        if BETTER * _misfit([p for pairs in _tests(spindle, campaign, scale) for p in pairs if p.loud]) < told:
+        if BETTER * _misfit([p for pairs in _tests(spindle, campaign, scale).values() for p in pairs if p.loud]) < told:
             lines = next(t.frf.frequency for t in campaign.tests if t.frf is not None)
             return f"all FRFs fit those that {spindle.name} has far better with lines from {scale * lines[0]:.4g} to {scale * lines[-1]:.4g} Hz: is the unit of their axis another than is told, as {mistake}?"
     return None
@@ -147,7 +161,16 @@ def _shared(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], judged: C
 
 
 def _factors(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
-    return [_said(who, factor, scene) for who, factor in _shared(tests, names, _factor)]
+    return [_said(who, factor, scene) for who, factor in _shared(tests, names, _factor)] or _scaled(tests, scene)
+
+
+def _scaled(tests: Sequence[Sequence[Pair]], scene: str) -> list[str]:
+    """What is said where all FRFs are larger, or smaller, by one large factor that no two units have: a sensitivity that was left out."""
+    ratios = np.array([r for pairs in tests for p in pairs if p.loud and (r := _ratio(p)) is not None])
+    middle = float(np.median(ratios)) if len(ratios) > 1 else 0.0  # one alone may be so far from its drawing
+    if not LARGE < abs(middle) < ENDLESS or np.abs(ratios - middle).max() > ALIKE * abs(middle):
+        return []
+    return [f"all FRFs are about {_times(np.exp(middle))} those that {scene} has: is a unit or a sensitivity another than is told?"]
 
 
 def _reversed(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
@@ -155,18 +178,25 @@ def _reversed(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: 
     return [f"{who} have the other sign than those that {scene} has: does sensor or hammer look the other way than is told, as -X where +X is?" for who, _ in whose]
 
 
-def _factor(pair: Pair) -> float | None:
-    """The factor of `FACTORS` by which an FRF is larger than computed; None where it is none of them."""
+def _ratio(pair: Pair) -> float | None:
+    """ln of how many times as large as computed an FRF is, over the louder half of its lines; None where that scatters."""
     ratio = (pair.measured - pair.computed)[pair.computed >= np.median(pair.computed)]
     middle = float(np.median(ratio))
-    if float(np.median(np.abs(ratio - middle))) > SCATTER:
-        return None
-    return next((f for f in FACTORS if abs(np.exp(middle) / f - 1) <= WITHIN), None)
+    return middle if float(np.median(np.abs(ratio - middle))) <= SCATTER else None
+
+
+def _factor(pair: Pair) -> float | None:
+    """The factor of `FACTORS` by which an FRF is larger than computed; None where it is none of them."""
+    middle = _ratio(pair)
+    return next((f for f in FACTORS if middle is not None and abs(np.exp(middle) / f - 1) <= WITHIN), None)
 
 
 def _said(who: str, factor: float, scene: str) -> str:
-    times = f"{factor:.4g} times" if factor > 1 else f"1/{1 / factor:.4g} of"
-    return f"{who} are about {times} those that {scene} has: is a unit another than is told, as {FACTORS[factor]}?"
+    return f"{who} are about {_times(factor)} those that {scene} has: is a unit another than is told, as {FACTORS[factor]}?"
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.4g} times" if factor > 1 else f"1/{1 / factor:.4g} of"
 
 
 # ---------------------------------------------------------------- channels of each other

@@ -11,8 +11,9 @@ import pytest
 from tests.conftest import DATA, SCENE
 from tests.sim.importing.exported import table
 from thermospindle.model.scene.reading import load
+from thermospindle.report.verbs.compare import compare
 from thermospindle.report.verbs.importing import bring
-from thermospindle.sim.campaign.campaign import Campaign, read_campaign
+from thermospindle.sim.campaign.campaign import Campaign, read_campaign, write_campaign
 from thermospindle.sim.importing.frfs import likeness
 from thermospindle.sim.importing.frfs.likeness import likenesses
 from thermospindle.sim.importing.units import of_frf
@@ -58,6 +59,51 @@ def test_a_factor_between_units_is_said_of_what_has_it(factor, spindle, foreign)
         [said] = likenesses(spindle, changed(foreign, change))
         assert said.startswith(f"{who} about {told}")
     assert likenesses(spindle, changed(foreign, lambda v: 3.0 * v)) == []
+
+
+def of_one(campaign: Campaign, test: int, change: Callable[[np.ndarray], np.ndarray]) -> Campaign:
+    """One of the tests alone changed."""
+    rows = zip(campaign.tests, changed(campaign, change).tests, strict=True)
+    return replace(campaign, tests=tuple(new if k == test else t for k, (t, new) in enumerate(rows)))
+
+
+def test_what_is_mistaken_in_one_test_is_said_of_it(spindle, foreign):
+    """A sensor glued on the other way round between two tests, one file in g, two cables exchanged: the others are right, and all together told nothing."""
+    order, first = np.array([0, 1, 3, 2, 4, 5, 6]), np.where(np.arange(7) == 0, -1.0, 1.0)[:, None, None]
+    for k in (0, 2):
+        begins = f"test {foreign.tests[k].id}: "
+        for change, what in (
+            (lambda v: v / 9.80665, "all FRFs are about 1/9.807 of"),
+            (lambda v: v / 22.5, "all FRFs are about 1/2"),
+            (lambda v: first * v, "the FRFs of response 1 (hub_top0) have the other sign"),
+            (lambda v: v[order], f"responses 3 ({spindle.points[2].name}) and 4 ({spindle.points[3].name}): each fits"),
+        ):
+            [said] = likenesses(spindle, of_one(foreign, k, change))
+            assert said.startswith(begins + what)
+    two = of_one(of_one(foreign, 0, lambda v: -v), 1, lambda v: -v)
+    [said] = likenesses(spindle, two)
+    assert said.startswith(f"tests {foreign.tests[0].id} and {foreign.tests[1].id}: all FRFs have the other sign")
+
+
+def test_a_comparison_says_it_of_a_campaign_that_was_imported_without_the_scene(foreign, tmp_path):
+    """Of a sensor reversed in one test it told 0.538 as MAC, and no more."""
+    first = np.where(np.arange(7) == 0, -1.0, 1.0)[:, None, None]
+    few = replace(foreign, tests=foreign.tests[:2])
+    write_campaign(of_one(few, 1, lambda v: first * v), tmp_path / "c")
+    [said] = compare(SCENE, tmp_path / "c").values["warnings"]
+    assert said.startswith(f"test {few.tests[1].id}: the FRFs of response 1 (hub_top0) have the other sign")
+    write_campaign(few, tmp_path / "d")
+    assert compare(SCENE, tmp_path / "d").values["warnings"] == []
+
+
+def test_a_sensitivity_left_out_is_said(spindle, foreign):
+    """mV told as N: a factor of 22.5 that no two units have. Of an FRF that symmetry forbids a factor says nothing."""
+    [said] = likenesses(spindle, changed(foreign, lambda v: v / 22.5))
+    assert said.startswith("all FRFs are about 1/23 of")
+    assert "sensitivity" in said
+    frfs = [(t, t.frf) for t in foreign.tests if t.frf is not None]
+    forbidden = [replace(t, frf=replace(f, value=f.value[2:3, 1:], response_nodes=f.response_nodes[2:3], reference_nodes=f.reference_nodes[1:], sd=None, coherence=None)) for t, f in frfs]
+    assert likenesses(spindle, replace(foreign, tests=tuple(forbidden))) == []
 
 
 @pytest.mark.parametrize("response", range(7))
