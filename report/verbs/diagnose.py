@@ -32,6 +32,7 @@ from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects import CATALOGUE
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.own import effect_of
+from thermospindle.sim.importing.frfs.likeness import likenesses
 
 
 def diagnose(
@@ -77,7 +78,7 @@ def diagnose(
         write_json("diagnosis.json")(folder, answer)
         _write(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()), name=whole.name)
 
-    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *left_out(tests), *_found(found)])
+    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *left_out(tests), *likenesses(spindle, tests), *_found(found)])
 
 
 def _found(found: verdict.Diagnosis) -> list[str]:

@@ -116,3 +116,18 @@ def test_lines_of_the_running_speed_are_said_and_cost_nothing(spindle: Spindle, 
     assert "tests.lab1: lines of the running speed stand in the FRFs, at" in warning
     assert (answer["verdict"], answer["effects"]) == ("none", [])
     assert answer["error"]["before"] < 1.5
+
+
+@pytest.mark.slow
+def test_a_sensor_that_one_test_has_reversed_is_said_beside_the_verdict(
+    spindle: Spindle, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Glued on the other way between cold and hot: whatever the verdict, it is of a mistake in measuring."""
+    lag = by_name("soak_lag")
+    monkeypatch.setattr(verb, "with_effects", lambda scene, files: (spindle, (lag,)))
+    tests = ((20.0, 0.0), (60.0, 7200.0))
+    frequency, random = np.arange(400.0, 3000.1, 8.0), np.random.default_rng(6)
+    measured = [noisy(h, random) for h in exact(spindle, frequency, 2, tests, lag=0.0)]
+    measured[1][3] *= -1
+    (warning,) = diagnosed(written(tmp_path, frequency, measured, "(m/s)/N", tests), capsys)["warnings"]
+    assert warning.startswith(f"test lab1: the FRFs of response {RESPONSES[3]} (seat90) have the other sign")
