@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import UnionType
@@ -200,8 +200,8 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
     key = ".".join(words)
     match problem["type"]:
         case "extra_forbidden":
-            allowed = _allowed_keys(form, location[:-1])
-            return f"{where}: {key}: unknown key; allowed here: {', '.join(allowed)}{meant(str(location[-1]), allowed)}"
+            word, allowed = str(location[-1]), _allowed_keys(form, location[:-1])
+            return f"{where}: {key}: unknown key; allowed here: {', '.join(allowed)}{meant(word, allowed) or _elsewhere(word, form)}"
         case "missing":
             return f"{where}: {key}: missing, and has no default"
         case _:
@@ -215,6 +215,26 @@ def meant(word: str, allowed: Sequence[str]) -> str:
     """What to say after all that is allowed: the one that an unknown `word` is most like."""
     near = get_close_matches(word, allowed, n=1)
     return f"; did you mean {near[0]}?" if near else ""
+
+
+def _elsewhere(word: str, form: type[BaseModel]) -> str:
+    """What to say of an unknown `word` that is most like a key of another table of the file."""
+    tables = dict(_tables("", form))
+    near = get_close_matches(word, list(dict.fromkeys(key for keys in tables.values() for key in keys)), n=1, cutoff=0.7)
+    places = [table for table, keys in tables.items() if near and near[0] in keys]
+    at = [f"in {table}" if table else "at the top of the file" for table in places]
+    return f"; {near[0]} stands {' or '.join(at)}" if at else ""
+
+
+def _tables(name: str, form: Any) -> Iterator[tuple[str, list[str]]]:
+    """The keys of a file's tables, by their names: those that have one, without what is in tables that are named freely."""
+    yield name, [field.alias or key for key, field in form.model_fields.items()]
+    for key, field in form.model_fields.items():
+        inner = _table_in(field.annotation)
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            each = "list" in str(field.annotation)
+            called = ".".join(filter(None, (name.strip("[]"), field.alias or key)))
+            yield from _tables(f"[[{called}]]" if each else f"[{called}]", inner)
 
 
 def _told(kind: str, message: str, value: Any) -> str:

@@ -139,6 +139,8 @@ REFUSED = [
     ("from-0-Hz", lambda r: r["hammer_test"].update(band_Hz=[0.0, 6000.0]), "hammer_test", "above 0 Hz"),
     ("sampling", lambda r: r["hammer_test"].update(sample_rate_Hz=5000.0), "hammer_test", "2.5 times"),
     ("heat", lambda r: r["thermal"]["gaps"][0].update(regions=["shaft", "hub"]), "thermal.gaps: 'hub'", "did you mean hub body?"),
+    ("in-another-table", lambda r: r["materials"]["steel"].update(reference_temperature_K=293.0), "materials.steel.reference_temperature_K: unknown key", "; reference_temperature_C stands at the top of the file"),
+    ("in-another-list", lambda r: r["structure"].update(direction="+X"), "structure.direction: unknown key", "; direction stands in [[measuring.points]]"),
     ("unknown-table", lambda r: r.update(extra={}), "extra: unknown key", "materials"),
 ]
 
