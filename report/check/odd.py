@@ -204,9 +204,10 @@ def _mesh(found: Looked) -> Iterator[str]:
     off = np.abs(lumped[:count] / spread[:count] - 1)
     if count and off.max() > COARSE:
         k = int(np.argmax(off))
+        way = "low" if lumped[k] < spread[k] else "high"
         yield (
-            f"the shaft's elements are long for the band of the hammer test: the mode at {spread[k]:.0f} Hz is off by {100 * off[k]:.2g} % in modes, FRFs and virtual tests, whose masses are at "
-            "nodes; half of longest_element_mm makes that a quarter"
+            f"the shaft's elements are long for the band of the hammer test: mode {k + 1} at {lumped[k]:.2f} Hz is {100 * off[k]:.2g} % too {way} in modes, FRFs and virtual tests, whose masses are at "
+            f"nodes, and {spread[k]:.0f} Hz with masses along the elements; half of longest_element_mm makes that a quarter"
         )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +58,7 @@ ODD = [
     ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
     ("rotor", "unbalance_z_mm = 225.0", "unbalance_z_mm = 925.0", "imperfections.unbalance_z_mm = 925: lies beyond 'shaft', on which it acts, which spans 0 to 600"),
     ("rotor", "unbalance_z_mm = 225.0", 'unbalance_z_mm = 385.0\nunbalance_body = "disc"', "unbalance_z_mm = 385: lies beyond 'disc', on which it acts, whose centre of mass is at 225"),
-    ("mk7702", "longest_element_mm = 20.0", "longest_element_mm = 90.0", "the shaft's elements are long for the band of the hammer test: the mode at"),
+    ("mk7702", "longest_element_mm = 20.0", "longest_element_mm = 90.0", "the shaft's elements are long for the band of the hammer test: mode "),
     ("rotor", "outer_mm = [[30, 600]]", "outer_mm = [[30, 300], [150, 300]]", "its diameter jumps from 30 to 150 mm at z_mm = 300"),
 ]  # fmt: skip
 
@@ -106,6 +108,24 @@ def test_what_moves_freely_and_what_is_constant_is_said(capsys: pytest.CaptureFi
     assert any("against 2 motions" in words for words in checked(SCENES["free_shaft"], capsys)["odd"])
     assert any("constant numbers" in words for words in checked(SCENES["mk7702"], capsys)["odd"])
     assert checked(SCENES["hdd_2003"], capsys)["odd"] == []
+
+
+def test_a_coarse_shaft_is_told_by_the_mode_that_modes_lists(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By its number and frequency there; the other frequency is what short elements come to."""
+    text = SCENES["mk7702"].read_text(encoding="utf-8")
+    listed = []
+    for element in (90.0, 10.0):
+        (tmp_path / "spindle.toml").write_text(text.replace("longest_element_mm = 20.0", f"longest_element_mm = {element}"), encoding="utf-8")
+        assert main(["modes", str(tmp_path), "--json"]) == 0
+        listed.append([m["frequency_Hz"] for m in json.loads(capsys.readouterr().out)["modes"]])
+        if element == 90.0:
+            [words] = (words for words in checked(tmp_path, capsys)["odd"] if words.startswith("the shaft's elements are long"))
+    found = re.search(r"mode (\d+) at ([\d.]+) Hz is ([\d.]+) % too low .* and (\d+) Hz with masses along", words)
+    assert found is not None
+    number, told, short = int(found[1]), float(found[2]), float(found[4])
+    assert told == pytest.approx(listed[0][number - 1], abs=0.005)
+    assert short == pytest.approx(listed[1][number - 1], rel=2e-3)
+    assert float(found[3]) == pytest.approx(100 * (1 - told / short), abs=0.1)
 
 
 def test_what_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
