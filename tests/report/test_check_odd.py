@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.report.checked import SCENES, checked
 from thermospindle.cli import main
 from thermospindle.model.machine import Condition
@@ -132,6 +134,47 @@ def test_what_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
     (tmp_path / "spindle.toml").write_text(SCENES["mk7702"].read_text(encoding="utf-8").replace("z_mm = 81.0", 'z_mm = "81"'), encoding="utf-8")
     assert main(["check", str(tmp_path)]) == 2
     assert "bearings.front1.z_mm = '81': input should be a valid number" in capsys.readouterr().err
+
+
+def massless(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    (folder / "spindle.toml").write_text(text, encoding="utf-8")
+    return [words for words in checked(folder, capsys)["odd"] if words.startswith("section.regions: no body or shaft has the mass of")]
+
+
+def test_a_region_whose_mass_nothing_has_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a part whose bodies are all made of regions; a body given by numbers, or a ground that holds rings, may stand for what is not named."""
+    text = (ROOT / "tests" / "scenes" / "inner_turning_spring" / "spindle.toml").read_text(encoding="utf-8")
+    left_out = text.replace('regions = ["shaft", "nose", "lower inner ring", "upper inner ring"]\nmoves', 'regions = ["shaft", "lower inner ring", "upper inner ring"]\nmoves')
+    assert left_out != text
+    assert massless(text, tmp_path, capsys) == []
+    [words] = massless(left_out, tmp_path, capsys)
+    spindle = load(tmp_path)
+    nose = spindle.region("nose")
+    mass = spindle.materials[nose.material].density * np.pi * (nose.r[1] ** 2 - nose.r[0] ** 2) * (nose.z[1] - nose.z[0])
+    assert f"'nose' ({mass:.3g} kg), rotating; regions of a body, or mass_regions of a shaft, may name it" in words
+    standing = text.replace('regions = ["housing", "lower outer ring", "upper outer ring"]\nmoves', 'regions = ["housing", "lower outer ring"]\nmoves')
+    assert "'upper outer ring' (" in massless(standing, tmp_path, capsys)[0]
+    grounded = standing.replace('outer_body = "housing"', 'outer_body = "ground"')
+    assert grounded != standing != text
+    assert massless(grounded, tmp_path, capsys) == []
+
+
+def test_regions_that_a_shaft_is_of_or_carries_have_their_mass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = SCENES["five_bearing"].read_text(encoding="utf-8")
+    drawn = re.sub(r"^(outer_mm|bore_mm) = .*\n", "", text, count=2, flags=re.MULTILINE)
+    regions = [r for r in tomllib.loads(text)["section"]["regions"] if r["part"] == "rotating"]
+    bends, carried = ([r["name"] for r in regions if (r.get("role") == "shaft") == own] for own in (True, False))
+
+    def of_regions(**keys: list[str]) -> str:
+        told = "".join(f"{key} = {json.dumps(names)}\n" for key, names in keys.items())
+        return drawn.replace('name = "spindle"\nmaterial = "steel"\n', f'name = "spindle"\n{told}', 1)
+
+    assert massless(text, tmp_path, capsys) == []
+    assert massless(of_regions(regions=bends, mass_regions=carried), tmp_path, capsys) == []
+    [words] = massless(of_regions(regions=bends), tmp_path, capsys)
+    assert re.findall(r"'([^']+)' \(", words) == carried
+    [words] = massless(of_regions(regions=bends, mass_regions=carried[1:]), tmp_path, capsys)
+    assert re.findall(r"'([^']+)' \(", words) == carried[:1]
 
 
 def critical_words(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
