@@ -22,7 +22,7 @@ from thermospindle.model.structure import Body, Structure
 
 PARTS = ("stationary", "rotating")
 RACEWAY_WIDTH = 1.9
-"""Width of a bearing over its ball diameter where none is told and rings share a tube: 1.7 to 2.1 in series 70, 719 and miniature ones."""
+"""Largest width of a bearing over its ball diameter where none is told and rings share a tube: 1.7 to 2.1 in series 70, 719 and miniature ones."""
 
 
 @dataclass(frozen=True)
@@ -278,13 +278,14 @@ class Spindle:
         """Heights (m) between which the raceway of `bearing` lies on its region `ring`.
 
         The bearing's height plus and minus half its `raceway_width`, inside the region. Without a width the whole height of a region that
-        serves one bearing, and `RACEWAY_WIDTH` ball diameters on one that several share.
+        serves one bearing, and on one that several share `RACEWAY_WIDTH` ball diameters, or as much as the nearest row leaves, but no less than a ball.
         """
         region, width = self.region(ring), bearing.raceway_width
         if width is None:
-            if sum(ring in (b.inner_ring, b.outer_ring) for b in self.ringed) == 1:
+            sharing = [abs(b.z - bearing.z) for b in self.ringed if b.name != bearing.name and ring in (b.inner_ring, b.outer_ring)]
+            if not sharing:
                 return region.z
-            width = RACEWAY_WIDTH * bearing.ball_diameter
+            width = max(bearing.ball_diameter, min(RACEWAY_WIDTH * bearing.ball_diameter, *sharing))
         return max(region.z[0], bearing.z - width / 2), min(region.z[1], bearing.z + width / 2)
 
     def region(self, name: str) -> Region:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 SAME_HEIGHT = 1e-6  # m, within which two heights are one node
@@ -46,6 +46,7 @@ class Shaft:
     rotary: float = 1.0
     moves: tuple[str, ...] = ("x", "y", "z", "tilt_x", "tilt_y")  # of its nodes, in the order of `structure.MOVES`
     loss_factor: float = 0.0  # of its elements, the same at all frequencies
+    regions: tuple[str, ...] = field(default=(), compare=False, repr=False)  # the section regions whose mass it has; empty for a shaft given by numbers
 
     @cached_property
     def bodies(self) -> tuple[str, ...]:

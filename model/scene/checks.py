@@ -160,12 +160,13 @@ def check_raceways(file: Path, spindle: Spindle) -> None:
                     f"z_mm = {_mm(heights)}; a raceway must be a free face of its ring, and where regions overlap the later one covers the earlier"
                 )
     for a, b in combinations(spindle.ringed, 2):
-        for ring_of_both in {a.inner_ring, a.outer_ring} & {b.inner_ring, b.outer_ring}:
+        for ring_of_both in (name for name in (a.inner_ring, a.outer_ring) if name in (b.inner_ring, b.outer_ring)):
             lower, upper = sorted((spindle.raceway(ring_of_both, a), spindle.raceway(ring_of_both, b)))
             if lower[1] > upper[0] + SAME_HEIGHT:
+                key, value = next(((f"{c.name}.raceway_width_mm", c.raceway_width) for c in (b, a) if c.raceway_width is not None), (f"{b.name}.z_mm", b.z))
+                allowed = "are rows a ball apart" if key.endswith("z_mm") else "are widths that leave them apart"
                 raise BadInput(
-                    f"{file}: bearings.{b.name}.raceway_width_mm: the raceways of {a.name!r} and {b.name!r} on {ring_of_both!r}, z_mm = {_mm(lower)} "
-                    f"and {_mm(upper)}, overlap; allowed are widths that leave them apart"
+                    f"{file}: bearings.{key} = {value * 1e3:g}: the raceways of {a.name!r} and {b.name!r} on {ring_of_both!r}, z_mm = {_mm(lower)} and {_mm(upper)}, overlap; allowed {allowed}"
                 )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import accumulate, pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, Strict, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, Strict, model_validator
 
 from thermospindle.model.scene.fields import Name, NotNegative, Place, Positive, Share, Table, one_damping
 from thermospindle.model.scene.section import Section, slabs
@@ -63,6 +63,7 @@ class ShaftForm(Table):
     damping_ratio: Share | None = None
     loss_factor: Share | None = None
     role: Literal["shaft", "housing"] | None = None
+    _drawn_from: tuple[str, ...] = PrivateAttr(())
 
     @model_validator(mode="after")
     def _drawn_whole(self) -> ShaftForm:
@@ -121,7 +122,9 @@ class ShaftForm(Table):
             "materials": [s.material for s in cut],
         }
         told = self.model_dump(include=self.model_fields_set - {"regions", "mass_regions"})
-        return ShaftForm.model_validate(told | drawn)
+        shaft = ShaftForm.model_validate(told | drawn)
+        shaft._drawn_from = (*self.regions, *self.mass_regions)
+        return shaft
 
     def _one_section(self) -> None:
         """Refuses a shaft that is neither round nor rectangular, or both, and one that turns and is not as stiff in all directions."""
@@ -193,6 +196,7 @@ class ShaftForm(Table):
             shear=shear,
             rotary=rotary,
             moves=tuple(name for name in MOVES if name in self.moves),
+            regions=self._drawn_from,
         )
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from thermospindle.diagnosis.forward.linear import mass_between
 from thermospindle.model.carrier import RADIAL_LOAD, UNBALANCE, load_carrier, turning_parts, unbalanced
 from thermospindle.model.errors import listed
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.machine import PARTS, Point, Spindle
 from thermospindle.model.rotor.modes import lost_to_rounding, poles_below
+from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.units import HERTZ, MM, RPM
@@ -87,6 +88,23 @@ def _compact(found: Looked) -> Iterator[str]:
                 f"body {b.name!r}: {b.mass:.4g} kg with moments of inertia of at most {largest:.3g} kg m2 would be a ball of {density:.2g} kg/m3 at the least, and no metal has more than {DENSEST:.3g}: "
                 "a mass in g, or a moment of inertia in another unit than its key's?"
             )
+
+
+def _massless(found: Looked) -> Iterator[str]:
+    """Regions of the section whose mass nothing has, in a part of which everything else is made of regions: a body or shaft given by numbers, or a ground that holds rings, may stand for them."""
+    spindle, structure = found.spindle, found.spindle.structure
+    grounded = any("ground" in (b.inner_body, b.outer_body) for b in spindle.all_bearings)
+    for part in PARTS:
+        turns = part == "rotating"
+        own = [set(b.regions) for b in structure.rigid_bodies if b.turns == turns] + [set(s.regions) for s in structure.shafts if s.turns == turns]
+        if not own or not all(own) or (grounded and not turns):
+            continue
+        regions = [g for g in spindle.regions if g.part == part]
+        left = [g.name for g in regions if g.name not in set().union(*own)]
+        tiles = {name: [t for t in cells(regions) if t.region == name] for name in left}
+        each = [f"{name!r} ({mass_properties(of, regions, dict(spindle.materials)).mass:.3g} kg)" for name, of in tiles.items() if of]
+        if each:
+            yield f"section.regions: no body or shaft has the mass of {listed(each)}, {part}; regions of a body, or mass_regions of a shaft, may name {'it' if len(each) == 1 else 'them'}"
 
 
 def _free(found: Looked) -> Iterator[str]:
@@ -204,9 +222,10 @@ def _mesh(found: Looked) -> Iterator[str]:
     off = np.abs(lumped[:count] / spread[:count] - 1)
     if count and off.max() > COARSE:
         k = int(np.argmax(off))
+        way = "low" if lumped[k] < spread[k] else "high"
         yield (
-            f"the shaft's elements are long for the band of the hammer test: the mode at {spread[k]:.0f} Hz is off by {100 * off[k]:.2g} % in modes, FRFs and virtual tests, whose masses are at "
-            "nodes; half of longest_element_mm makes that a quarter"
+            f"the shaft's elements are long for the band of the hammer test: mode {k + 1} at {lumped[k]:.2f} Hz is {100 * off[k]:.2g} % too {way} in modes, FRFs and virtual tests, whose masses are at "
+            f"nodes, and {spread[k]:.0f} Hz with masses along the elements; half of longest_element_mm makes that a quarter"
         )
 
 
@@ -262,5 +281,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    *OF_BEARINGS, _seats, _materials, _compact, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _planes, _effects,
+    *OF_BEARINGS, _seats, _materials, _compact, _massless, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _planes, _effects,
 )  # fmt: skip

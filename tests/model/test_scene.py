@@ -51,6 +51,16 @@ def one_tube_too_wide(raw):
         b.update(outer_ring="lower outer ring", raceway_width_mm=12.0)
 
 
+def one_tube_too_close(raw):
+    one_tube_too_wide(raw)
+    for b in raw["bearings"].values():
+        b.pop("raceway_width_mm")
+    for key in ("inner_ring", "outer_ring"):
+        raw["bearings"]["upper"][key] = raw["bearings"]["lower"][key]
+    region(raw, "lower inner ring").update(z_mm=[3.5, 6.5])
+    raw["bearings"]["upper"]["z_mm"] = 6.0
+
+
 def collar(raw, r_mm, z_mm=(15.0, 18.0)):
     """A region more at the upper inner ring."""
     raw["section"]["regions"].append(region(raw, "upper inner ring") | {"name": "collar", "r_mm": r_mm, "z_mm": list(z_mm)})
@@ -92,7 +102,8 @@ REFUSED = [
         "sprung_bearing = 'x'",
         "lower, upper",
     ),
-    ("raceways", one_tube_too_wide, "raceway_width_mm: the raceways of 'lower' and 'upper'", "leave them apart"),
+    ("raceways", one_tube_too_wide, "bearings.upper.raceway_width_mm = 12: the raceways of 'lower' and 'upper'", "leave them apart"),
+    ("rows-too-close", one_tube_too_close, "bearings.upper.z_mm = 6: the raceways of 'lower' and 'upper' on 'lower inner ring'", "rows a ball apart"),
     ("step", lambda r: r["hammer_test"].update(sample_rate_Hz=25600.0), "step_us = ", "without it the program chooses"),
     ("type", lambda r: r["tolerances"].update(gain="big"), "tolerances.gain = 'big'", "number"),
     ("infinite", lambda r: r["tolerances"].update(gain=float("inf")), "tolerances.gain = inf", "finite"),

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.report.checked import SCENES, checked
 from thermospindle.cli import main
 from thermospindle.model.machine import Condition
@@ -56,7 +60,7 @@ ODD = [
     ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
     ("rotor", "unbalance_z_mm = 225.0", "unbalance_z_mm = 925.0", "imperfections.unbalance_z_mm = 925: lies beyond 'shaft', on which it acts, which spans 0 to 600"),
     ("rotor", "unbalance_z_mm = 225.0", 'unbalance_z_mm = 385.0\nunbalance_body = "disc"', "unbalance_z_mm = 385: lies beyond 'disc', on which it acts, whose centre of mass is at 225"),
-    ("mk7702", "longest_element_mm = 20.0", "longest_element_mm = 90.0", "the shaft's elements are long for the band of the hammer test: the mode at"),
+    ("mk7702", "longest_element_mm = 20.0", "longest_element_mm = 90.0", "the shaft's elements are long for the band of the hammer test: mode "),
     ("rotor", "outer_mm = [[30, 600]]", "outer_mm = [[30, 300], [150, 300]]", "its diameter jumps from 30 to 150 mm at z_mm = 300"),
 ]  # fmt: skip
 
@@ -108,10 +112,69 @@ def test_what_moves_freely_and_what_is_constant_is_said(capsys: pytest.CaptureFi
     assert checked(SCENES["hdd_2003"], capsys)["odd"] == []
 
 
+def test_a_coarse_shaft_is_told_by_the_mode_that_modes_lists(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By its number and frequency there; the other frequency is what short elements come to."""
+    text = SCENES["mk7702"].read_text(encoding="utf-8")
+    listed = []
+    for element in (90.0, 10.0):
+        (tmp_path / "spindle.toml").write_text(text.replace("longest_element_mm = 20.0", f"longest_element_mm = {element}"), encoding="utf-8")
+        assert main(["modes", str(tmp_path), "--json"]) == 0
+        listed.append([m["frequency_Hz"] for m in json.loads(capsys.readouterr().out)["modes"]])
+        if element == 90.0:
+            [words] = (words for words in checked(tmp_path, capsys)["odd"] if words.startswith("the shaft's elements are long"))
+    found = re.search(r"mode (\d+) at ([\d.]+) Hz is ([\d.]+) % too low .* and (\d+) Hz with masses along", words)
+    assert found is not None
+    number, told, short = int(found[1]), float(found[2]), float(found[4])
+    assert told == pytest.approx(listed[0][number - 1], abs=0.005)
+    assert short == pytest.approx(listed[1][number - 1], rel=2e-3)
+    assert float(found[3]) == pytest.approx(100 * (1 - told / short), abs=0.1)
+
+
 def test_what_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "spindle.toml").write_text(SCENES["mk7702"].read_text(encoding="utf-8").replace("z_mm = 81.0", 'z_mm = "81"'), encoding="utf-8")
     assert main(["check", str(tmp_path)]) == 2
     assert "bearings.front1.z_mm = '81': input should be a valid number" in capsys.readouterr().err
+
+
+def massless(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    (folder / "spindle.toml").write_text(text, encoding="utf-8")
+    return [words for words in checked(folder, capsys)["odd"] if words.startswith("section.regions: no body or shaft has the mass of")]
+
+
+def test_a_region_whose_mass_nothing_has_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a part whose bodies are all made of regions; a body given by numbers, or a ground that holds rings, may stand for what is not named."""
+    text = (ROOT / "tests" / "scenes" / "inner_turning_spring" / "spindle.toml").read_text(encoding="utf-8")
+    left_out = text.replace('regions = ["shaft", "nose", "lower inner ring", "upper inner ring"]\nmoves', 'regions = ["shaft", "lower inner ring", "upper inner ring"]\nmoves')
+    assert left_out != text
+    assert massless(text, tmp_path, capsys) == []
+    [words] = massless(left_out, tmp_path, capsys)
+    spindle = load(tmp_path)
+    nose = spindle.region("nose")
+    mass = spindle.materials[nose.material].density * np.pi * (nose.r[1] ** 2 - nose.r[0] ** 2) * (nose.z[1] - nose.z[0])
+    assert f"'nose' ({mass:.3g} kg), rotating; regions of a body, or mass_regions of a shaft, may name it" in words
+    standing = text.replace('regions = ["housing", "lower outer ring", "upper outer ring"]\nmoves', 'regions = ["housing", "lower outer ring"]\nmoves')
+    assert "'upper outer ring' (" in massless(standing, tmp_path, capsys)[0]
+    grounded = standing.replace('outer_body = "housing"', 'outer_body = "ground"')
+    assert grounded != standing != text
+    assert massless(grounded, tmp_path, capsys) == []
+
+
+def test_regions_that_a_shaft_is_of_or_carries_have_their_mass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = SCENES["five_bearing"].read_text(encoding="utf-8")
+    drawn = re.sub(r"^(outer_mm|bore_mm) = .*\n", "", text, count=2, flags=re.MULTILINE)
+    regions = [r for r in tomllib.loads(text)["section"]["regions"] if r["part"] == "rotating"]
+    bends, carried = ([r["name"] for r in regions if (r.get("role") == "shaft") == own] for own in (True, False))
+
+    def of_regions(**keys: list[str]) -> str:
+        told = "".join(f"{key} = {json.dumps(names)}\n" for key, names in keys.items())
+        return drawn.replace('name = "spindle"\nmaterial = "steel"\n', f'name = "spindle"\n{told}', 1)
+
+    assert massless(text, tmp_path, capsys) == []
+    assert massless(of_regions(regions=bends, mass_regions=carried), tmp_path, capsys) == []
+    [words] = massless(of_regions(regions=bends), tmp_path, capsys)
+    assert re.findall(r"'([^']+)' \(", words) == carried
+    [words] = massless(of_regions(regions=bends, mass_regions=carried[1:]), tmp_path, capsys)
+    assert re.findall(r"'([^']+)' \(", words) == carried[:1]
 
 
 def critical_words(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.machine import Condition, Region
+from thermospindle.model.scene.checks import check_raceways
 from thermospindle.thermal import conduction, heat
 from thermospindle.thermal.expansion import expand
 from thermospindle.thermal.influence import influence, races, raceways
@@ -73,6 +75,16 @@ def test_raceways_are_a_bearing_wide(tube, spindle):
         assert np.mean(outer.z) == pytest.approx(b.z)
         told = replace(b, raceway_width=1e-3)
         assert np.diff(tube.raceway("tube", told))[0] == pytest.approx(1e-3)
+
+
+def test_raceways_of_a_tandem_pair_meet(tube):
+    """Bearings side by side are as wide as they are apart, a series 70 pair 1.89 ball diameters: less than where nobody is near."""
+    ball = tube.bearings[0].ball_diameter
+    low, high = (replace(b, z=z) for b, z in zip(tube.bearings, (8.0e-3, 8.0e-3 + 1.89 * ball), strict=True))
+    pair = replace(tube, bearings=(low, high))
+    assert pair.raceway("tube", low) == pytest.approx((8.0e-3 - 0.945 * ball, 8.0e-3 + 0.945 * ball))
+    assert pair.raceway("tube", high)[0] == pytest.approx(pair.raceway("tube", low)[1])
+    check_raceways(Path("spindle.toml"), pair)
 
 
 def test_heat_enters_each_raceway_where_it_is(tube):
