@@ -218,6 +218,9 @@ def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint, 
 
 # ---------------------------------------------------------------- a unit force
 
+SPRINGS = "bearings"
+"""Share of the compliance in what is of the bearings and is none of them: the springs of preloads."""
+
 
 def static_json(answers: Sequence[Around], bearings: str, beam: str) -> dict[str, Any]:
     """By point: stiffness (None where nothing holds it), reactions and shares of the compliance; the same `axial`, and `across` where the point measures across the axis."""
@@ -252,12 +255,15 @@ def show_static(console: Console, values: dict[str, Any], answers: Sequence[Arou
         console.print("axis: a force along it, on the axis at the point's height.")
     if not parts:
         return  # every point is free to move
+    shares = {part: [f"{100 * row['compliance_shares'].get(part, 0.0):z.1f}" for row in points.values()] for part in parts}
+    if set(shares.get(SPRINGS, ())) == {"0.0"}:  # preload springs, which act along the axis alone
+        del shares[SPRINGS]
     console.print()
     show_grid(
         console,
         "Share of the compliance at each point in every part, %",
-        ["point", *(f"{name}\n%" for name in parts)],
-        [[name, *("-" if row["free"] else f"{100 * row['compliance_shares'].get(part, 0.0):.1f}" for part in parts)] for name, row in points.items()],
+        ["point", *(f"{'preload springs' if part == SPRINGS else part}\n%" for part in shares)],
+        [[name, *("-" if row["free"] else share[i] for share in shares.values())] for i, (name, row) in enumerate(points.items())],
         words=("point",),
     )
 
