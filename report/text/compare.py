@@ -231,7 +231,7 @@ def _show_modes(console: Console, c: Comparison) -> None:
             error = (f"{m.error:+z.2f}", f"{100 * m.error / m.measured:+z.2f}", f"{m.residual:+z.1f}")
             name = t.test.id if m is t.modes[0] else ""
             frequencies = (f"{m.measured:.2f}", f"{m.sd:.2f}", f"{m.computed:.2f}")
-            beside = (damping, f"{100 * m.damping_computed:.3f}", damping_error, mac)
+            beside = (damping, f"{100 * m.damping_computed:z.3f}", damping_error, mac)
             rows.append([name, str(m.number), m.kind, *frequencies, *error, *beside])
     show_grid(console, "Modes, computed - measured", columns, rows, ("test", "kind"), keys=3)
     console.print(

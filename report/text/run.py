@@ -89,7 +89,7 @@ def show_impact(console: Console, step: Step) -> None:
     computed, shared = {k: step.point.modes[i] for i, k in seen.items()}, _shared(step, seen)
     for i, (f, sf, z, sz) in enumerate(zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)):
         exact = computed.get(i)
-        own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:.3f}")
+        own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:z.3f}")
         rows.append([f"{f:.2f}", _error(sf, 2), f"{100 * z:.3f}", _error(100 * sz, 3), *own])
     console.print(f"{_found(step, computed, set(shared.values()))}\n", highlight=False, markup=False)
     show_grid(console, title, ("f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%"), rows)

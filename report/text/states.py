@@ -211,7 +211,7 @@ def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint, 
     rows = []
     for i, m in enumerate(answer["modes"], 1):
         shares = [f"{100 * m['energy'][g]:.1f}" for g in groups]
-        rows.append([str(i), f"{m['frequency_Hz']:.2f}", f"{100 * m['damping_ratio']:.3f}", m["kind"], m["whirl"], *shares])
+        rows.append([str(i), f"{m['frequency_Hz']:.2f}", f"{100 * m['damping_ratio']:z.3f}", m["kind"], m["whirl"], *shares])
     show_grid(console, title, columns, rows, ("kind", "whirl"), keys=2)
     console.print("The last columns share each mode's strain energy between the element groups.")
 
