@@ -18,7 +18,7 @@ from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy, to_real
 from thermospindle.model.rotor.static import Around, Static
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, in_rpm
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import write_csv
 from thermospindle.sim.operating import OperatingPoint
@@ -49,14 +49,14 @@ def table_json(table: StiffnessTable) -> dict[str, Any]:
 
     answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
     if len(table.speed) > 1:
-        answer["speeds"] = [{"speed_rpm": s / RPM, "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
+        answer["speeds"] = [{"speed_rpm": in_rpm(s), "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
     return answer | {"provenance": dict(table.provenance)}
 
 
 def modes_json(point: OperatingPoint, highest: float) -> dict[str, Any]:
     return {
         "temperature_C": point.condition.temperature,
-        "speed_rpm": point.condition.speed / RPM,
+        "speed_rpm": in_rpm(point.condition.speed),
         "status": point.state.status,
         "modes": [_mode_json(point, m) for m in point.modes_below(highest)],
     }
@@ -92,7 +92,7 @@ def write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
     elements = [e.name for e in points[0].chain.elements]
     head = ["temperature_C", "speed_rpm", "mode", "kind", "whirl", "frequency_Hz", "damping_ratio", *(f"energy_share_{name}" for name in elements)]
     rows = [
-        [p.condition.temperature, p.condition.speed / RPM, i, m.kind, m.whirl, m.frequency, m.damping_ratio, *(m.energy[e] for e in elements)]
+        [p.condition.temperature, in_rpm(p.condition.speed), i, m.kind, m.whirl, m.frequency, m.damping_ratio, *(m.energy[e] for e in elements)]
         for p in points
         for i, m in enumerate(p.modes, 1)
     ]

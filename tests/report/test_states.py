@@ -1,14 +1,16 @@
 """What titles say of a state of equilibrium."""
 
 import io
+import json
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from thermospindle.cli import main
 from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.files.stiffness_table import StiffnessTable
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, in_rpm
 from thermospindle.report.text.states import of_bearings, show_modes, show_told_table
 
 
@@ -41,3 +43,11 @@ def test_an_undamped_mode_has_no_damping_less_than_nothing():
     said = console.export_text()
     assert "0.000" in said
     assert "-0.000" not in said
+
+
+@pytest.mark.parametrize("rpm", [24000.0, 5400.1, -333.3, 0.0])
+def test_a_speed_is_told_as_it_was_given(rpm, capsys):
+    """24000 rpm was 24000.000000000004."""
+    assert in_rpm(rpm * RPM) == rpm
+    assert main(["modes", "hdd_2003", "--speed", str(rpm), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["speed_rpm"] == rpm
