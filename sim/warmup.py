@@ -33,7 +33,7 @@ from thermospindle.thermal.readout import Reading, reading
 
 TOLERANCE = 0.01  # K, estimated error of one time step
 TIME_CONSTANTS = 8.0  # of the slowest decay that a warm-up lasts by default: the rest is 0.03 %
-PARTS = 20  # of the time, after each of which progress is told
+PARTS = 20  # of the square root of the time, for steps begin short, after each of which progress is told
 STAGES = PARTS + 3
 """How often a warm-up tells of its progress."""
 SHORTEST = 1e-3  # s that a warm-up lasts: in far less, temperatures move by their rounding
@@ -121,17 +121,18 @@ def warm_up(
 
     told = 0
 
-    def passed(share: float) -> None:
+    def passed(share: float, whole: float) -> None:
         nonlocal told
-        while told < min(int(share * PARTS + 1e-9), PARTS):
+        while told < min(int(np.sqrt(share) * PARTS + 1e-9), PARTS):
             told += 1
-            progress(f"{100 * told // PARTS} % of the time")
+            progress(f"{share * whole / MINUTE:.3g} of {whole / MINUTE:.3g} min")
 
     def marched(whole: float) -> heat.History:
         reached.clear()
         drive(0.0, model.nodal(start))
         try:
-            return heat.march(model, drive, start, duration or whole, tolerance, whole / STEPS, passed)
+            end = duration or whole
+            return heat.march(model, drive, start, end, tolerance, whole / STEPS, lambda share: passed(share, end))
         except (OutsideRange, heat.NotSettled) as error:
             raise type(error)(f"{where} {_ran_away(machine, reached, str(error))}") from None
 

@@ -265,8 +265,11 @@ def test_rigid_rings_that_run_away_on_the_way_are_told(tmp_path):
     """Hot inner rings in a cold housing, rigidly preloaded: time, bearing, loads by their names, ring temperatures and what they do, instead of a law that ends."""
     scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace('preload_kind = "spring" ', 'preload_kind = "rigid" ')
     (tmp_path / "spindle.toml").write_text("".join(line for line in scene.splitlines(True) if not line.startswith(("sprung_", "preload_rate"))), encoding="utf-8")
+    said = []
     with pytest.raises(OutsideRange) as told:
-        warm_up(load(tmp_path), 120000 * RPM, 20.0)
+        warm_up(load(tmp_path), 120000 * RPM, 20.0, progress=said.append)
+    assert said, "nothing was told of how far it had come"
+    assert all(re.fullmatch(r"0\.[\d]+ of [\d.]+ min", words) for words in said)
     words = re.search(
         r"at 120000 rpm the bearings run away after 0\.\d+ min: rear has Palmgren's load of friction P1 = (\d+) N, [\d.]+ times its (\d+) N at the start \(axial load (\d+) N, at the start (\d+) N\), "
         r"with its inner ring at 1\d\d C and its outer one at \d\d C, a difference that has used up its radial clearance; the load heats it further .* a preload of springs, or less of it, gives way to hot rings$",
