@@ -14,3 +14,8 @@ MM, NM = 1e-3, 1e-9
 """m."""
 TO_MM, TO_UM, TO_NM = 1e3, 1e6, 1e9
 """A length in m, to show."""
+
+
+def in_rpm(speed: float) -> float:
+    """A speed (rad/s) in rpm as it was given: to 12 significant digits, for 24000 rpm to rad/s and back is 24000.000000000004."""
+    return float(f"{speed / RPM:.12g}")

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.machine import Condition, RollerBearing, Spindle
 from thermospindle.model.rotor.chain import matrices
@@ -32,11 +33,10 @@ from thermospindle.thermal.readout import Reading, reading
 
 TOLERANCE = 0.01  # K, estimated error of one time step
 TIME_CONSTANTS = 8.0  # of the slowest decay that a warm-up lasts by default: the rest is 0.03 %
-PARTS = 20  # of the time, after each of which progress is told
+PARTS = 20  # of the square root of the time, for steps begin short, after each of which progress is told
 STAGES = PARTS + 3
 """How often a warm-up tells of its progress."""
 SHORTEST = 1e-3  # s that a warm-up lasts: in far less, temperatures move by their rounding
-REMEDY = "thermal.convection cools more, thermal.friction heats less, and a preload of springs, or less of it, gives way to hot rings"
 STEPS = 48  # at least, over a warm-up of that length
 
 
@@ -114,31 +114,33 @@ def warm_up(
     reached: list[Reached] = []  # at first and last
 
     def drive(time: float, nodal: Array) -> heat.Running:
-        loads = friction.loads(spindle, machine.point(nodal).state)
-        reached[1:] = [Reached(time, nodal, loads)]
+        state = machine.point(nodal).state
+        loads = friction.loads(spindle, state)
+        reached[1:] = [Reached(time, nodal, loads, state)]
         return heat.Running(air, speed, loads)
 
     told = 0
 
-    def passed(share: float) -> None:
+    def passed(share: float, whole: float) -> None:
         nonlocal told
-        while told < min(int(share * PARTS + 1e-9), PARTS):
+        while told < min(int(np.sqrt(share) * PARTS + 1e-9), PARTS):
             told += 1
-            progress(f"{100 * told // PARTS} % of the time")
+            progress(f"{share * whole / MINUTE:.3g} of {whole / MINUTE:.3g} min")
 
     def marched(whole: float) -> heat.History:
         reached.clear()
         drive(0.0, model.nodal(start))
         try:
-            return heat.march(model, drive, start, duration or whole, tolerance, whole / STEPS, passed)
+            end = duration or whole
+            return heat.march(model, drive, start, end, tolerance, whole / STEPS, lambda share: passed(share, end))
         except (OutsideRange, heat.NotSettled) as error:
-            raise type(error)(f"{where} {_ran_away(machine, reached, str(error))}; {REMEDY}") from None
+            raise type(error)(f"{where} {_ran_away(machine, reached, str(error))}") from None
 
     where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
     try:
         field = heat.settled(model, lambda nodal: drive(0.0, nodal), start)
     except heat.NotSettled as error:
-        raise heat.NotSettled(f"{where} the bearings run away: {error}; {REMEDY}") from None
+        raise heat.NotSettled(f"{where} the bearings run away: {error}; {_remedy(spindle)}") from None
     except OutsideRange as error:
         if speed and not isinstance(error, heat.RanAway):  # too hot under the loads of the start, which says nothing of what becomes of them
             try:
@@ -147,7 +149,7 @@ def warm_up(
                 pass  # it is the start itself
             else:
                 marched(TIME_CONSTANTS * constant)
-        raise type(error)(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; {REMEDY}") from None
+        raise type(error)(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; {_remedy(spindle)}") from None
     final = model.nodal(field)
     constant = heat.slowest(model, field, drive(0.0, final))
     back = heat.feedback(model, field, lambda nodal: drive(0.0, nodal))
@@ -165,28 +167,50 @@ def warm_up(
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """What a warm-up came to: a time (s), nodal temperatures (nodes,) C and the loads (N) of bearings there."""
+    """What a warm-up came to: a time (s), nodal temperatures (nodes,) C, and there the loads P1 (N) of the friction of bearings and their state."""
 
     time: float
     nodal: Array
     loads: Mapping[str, float]
+    state: PairState
 
 
 def _ran_away(machine: _Machine, reached: Sequence[Reached], error: str) -> str:
-    """How far a warm-up came that left a law: the bearing whose load has grown most since the start, or the hottest where none has."""
-    begin, last = reached[0].loads, reached[-1]
+    """How far a warm-up came that left a law: the bearing whose load of friction has grown most since the start, or the hottest where none has, and what helps."""
+    begin, last = reached[0], reached[-1]
     after, regions = f"after {last.time / MINUTE:.3g} min", machine.read.region_means(last.nodal)
     temperatures = machine.read.model.bearing @ last.nodal
     ringed = machine.read.model.spindle.ringed
-    grown = {b.name: abs(last.loads[b.name]) / max(abs(begin[b.name]), 1e-9) for b in ringed}
+    grown = {b.name: abs(last.loads[b.name]) / max(abs(begin.loads[b.name]), 1e-9) for b in ringed}
     most = max(ringed, key=lambda b: grown[b.name])
     if grown[most.name] <= heat.GROWN:
-        return f"the bearings leave the range of a law {after}, {ringed[int(np.argmax(temperatures))].name} at {temperatures.max():.0f} C: {error}"
+        hottest = ringed[int(np.argmax(temperatures))].name
+        return f"the bearings leave the range of a law {after}, {hottest} at {temperatures.max():.0f} C: {error}; {_remedy(machine.spindle, hottest)}"
     inner, outer = regions[most.inner_ring], regions[most.outer_ring]
     return (
-        f"the bearings run away {after}: {most.name} carries {last.loads[most.name]:.0f} N, {grown[most.name]:.2g} times its {begin[most.name]:.0f} N at the start, with its inner ring at {inner:.0f} C and "
-        f"its outer one at {outer:.0f} C, and the load heats it further ({error})"
+        f"the bearings run away {after}: {most.name} has Palmgren's load of friction P1 = {last.loads[most.name]:.0f} N, {grown[most.name]:.2g} times its {begin.loads[most.name]:.0f} N at the start"
+        f"{_axially(begin.state, last.state, most.name)}, with its inner ring at {inner:.0f} C and its outer one at {outer:.0f} C{_taken_up(last.state, most.name) if inner > outer else ''}; "
+        f"the load heats it further ({error}); {_remedy(machine.spindle, most.name)}"
     )
+
+
+def _axially(begin: PairState, last: PairState, name: str) -> str:
+    """The axial load of a ball row now and at the start, in words; nothing of rollers, which float."""
+    return "" if name in last.rollers else f" (axial load {last.bearing(name).preload:.0f} N, at the start {begin.bearing(name).preload:.0f} N)"
+
+
+def _taken_up(state: PairState, name: str) -> str:
+    """What an inner ring warmer than the outer one does to radial clearance: none is left where groove centres lie as far apart in r as balls without load have them."""
+    row = None if name in state.rollers else state.bearing(name).row
+    used_up = state.rollers[name].clearance <= 0.0 if row is None else row.radial >= row.unloaded_distance
+    return f", a difference that {'has used up its' if used_up else 'takes up'} radial clearance"
+
+
+def _remedy(spindle: Spindle, name: str | None = None) -> str:
+    """What keeps the bearing `name`, or all of them, from running away; springs only where a preload has none."""
+    rigid = any(s.spring is None for s in spindle.sets if name is None or name in s.bearings)
+    helps = "a preload of springs, or less of it, gives way to hot rings" if rigid else "so does less preload or more radial clearance"
+    return f"thermal.convection cools more, thermal.friction heats less, and {helps}"
 
 
 @dataclass(frozen=True, eq=False)

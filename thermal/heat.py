@@ -228,7 +228,7 @@ def _agreed(
                 near = f"it runs away, or nearly: of a load that is added {back:.0%} come back through its heat, and at 100% there is no steady state; on the way "
             elif grown:
                 most = max(grown, key=lambda b: grown[b])
-                near = f"it runs away, or nearly: its own heat makes the load of {most} {grown[most]:.2g} times as large; on the way "
+                near = f"it runs away, or nearly: its own heat makes the load P1 of the friction of {most} {grown[most]:.2g} times as large; on the way "
             else:
                 raise
             raise RanAway(f"{near}{error}") from None

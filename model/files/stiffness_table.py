@@ -19,7 +19,7 @@ from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.files.cells import cell, name_of
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, in_rpm
 
 COLUMNS = {
     "contact_angle_deg": lambda b: np.degrees(b.contact_angle),
@@ -162,7 +162,7 @@ def write_table(table: StiffnessTable, path: Path) -> None:
         for name, columns in table.values.items():
             for i, t in enumerate(table.temperature):
                 for j, speed in enumerate(table.speed):
-                    writer.writerow([cell(name), repr(float(t)), repr(float(speed / RPM)), *(repr(float(columns[c][i, j])) for c in told)])
+                    writer.writerow([cell(name), repr(float(t)), repr(in_rpm(speed)), *(repr(float(columns[c][i, j])) for c in told)])
 
 
 def read_table(path: Path) -> StiffnessTable:

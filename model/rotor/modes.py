@@ -52,7 +52,7 @@ class Mode:
 
     def __repr__(self) -> str:
         whirl = "" if self.whirl == "none" else f", {self.whirl}"
-        return f"<{type(self).__name__} {self.kind}{whirl}, {self.frequency:.2f} Hz, damping {100 * self.damping_ratio:.3f} %>"
+        return f"<{type(self).__name__} {self.kind}{whirl}, {self.frequency:.2f} Hz, damping {100 * self.damping_ratio:z.3f} %>"
 
     def damped_frequency(self) -> float:
         return abs(self.pole.imag) / (2 * np.pi)

@@ -14,7 +14,7 @@ from thermospindle.model.carrier import load_carrier, unbalance_carrier
 from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import THEORIES, Shaft
 from thermospindle.model.structure import Body
-from thermospindle.model.units import RPM
+from thermospindle.model.units import in_rpm
 from thermospindle.sim.effects.effect import Effect, refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
 from thermospindle.sim.operating import OperatingPoint
@@ -34,7 +34,7 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
         "title": spindle.title,
         "reference_temperature_C": spindle.reference_temperature,
         "temperature_range_C": list(spindle.temperatures),
-        "nominal_speed_rpm": spindle.nominal_speed / RPM,
+        "nominal_speed_rpm": in_rpm(spindle.nominal_speed),
         "axial_load_N": spindle.axial_load,
         "radial_load_N": list(spindle.radial_load),
         "radial_load_z_mm": _mm(spindle.radial_load_z) if any(spindle.radial_load) else None,
@@ -149,7 +149,7 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) 
             "roller_force_N": state.contact_force,
         }
     if isinstance(b, LinearBearing):
-        table = {"temperatures_C": list(b.temperature), "speeds_rpm": [s / RPM for s in b.speed]} if len(b.temperature) * len(b.speed) > 1 else None
+        table = {"temperatures_C": list(b.temperature), "speeds_rpm": [in_rpm(s) for s in b.speed]} if len(b.temperature) * len(b.speed) > 1 else None
         return found | {"table": table}
     own = point.state.bearing(b.name)
     free = free_angle(b, own)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.model.units import RPM, TO_NM
+from thermospindle.model.units import RPM, TO_NM, in_rpm
 from thermospindle.report.log.read import Log
 from thermospindle.report.typeset import known, write_csv
 
@@ -72,7 +72,7 @@ def _run_words(log: Log) -> list[str]:
 def _map_json(log: Log) -> dict[str, Any]:
     temperatures, speeds, modes = log.grid
     return {
-        "grid": {"temperature_C": temperatures.tolist(), "speed_rpm": (speeds / RPM).tolist()},
+        "grid": {"temperature_C": temperatures.tolist(), "speed_rpm": [in_rpm(s) for s in speeds]},
         "modes_Hz": known(modes),
         "coincidences": log.rows("/numbers/coincidences"),
     }
@@ -99,7 +99,7 @@ def _runout_json(log: Log) -> dict[str, Any]:
     """The record as lists in nm."""
     return {
         "temperature_C": log.about["temperature_C"],
-        "speed_rpm": log.about["speed_rad_per_s"] / RPM,
+        "speed_rpm": in_rpm(log.about["speed_rad_per_s"]),
         "revolutions": log.about["revolutions"],
         "quoted_m": log.quoted,
         "lines": log.rows("/numbers/lines"),
@@ -107,7 +107,7 @@ def _runout_json(log: Log) -> dict[str, Any]:
         "nonrepeatable_nm": log.signals[3:].tolist(),
         "waterfall": [
             {
-                "speed_rpm": s["speed_rad_per_s"] / RPM,
+                "speed_rpm": in_rpm(s["speed_rad_per_s"]),
                 "frequency_Hz": s["frequency"].tolist(),
                 "radial_m": s["radial"].tolist(),
                 "axial_m": s["axial"].tolist(),
@@ -143,7 +143,7 @@ def _columns(log: Log, entity: str) -> dict[str, Any]:
 
 def _warmup_json(log: Log) -> dict[str, Any]:
     """Columns as in `warmup.csv`, null where a mode was lost."""
-    about = {"start_C": log.about["start_C"], "air_C": log.about["air_C"], "speed_rpm": log.about["speed_rad_per_s"] / RPM}
+    about = {"start_C": log.about["start_C"], "air_C": log.about["air_C"], "speed_rpm": in_rpm(log.about["speed_rad_per_s"])}
     return {**about, "time_constant_s": log.about["time_constant_s"], "columns": _columns(log, "/numbers/warmup")}
 
 

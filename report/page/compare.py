@@ -139,7 +139,7 @@ def _table(c: Comparison) -> str:
             damping = "–" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
             cells = [
                 label(t.test, ", ") if k == 0 else "", str(m.number), m.kind, with_error((m.measured, m.sd), digits=2), f"{m.computed:.2f}",
-                signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.residual, 1), damping, f"{100 * m.damping_computed:.3f}",
+                signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.residual, 1), damping, f"{100 * m.damping_computed:z.3f}",
                 "–" if m.damping_error is None else signed(100 * m.damping_error, 1), "–" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else ""),
             ]  # fmt: skip
             rows.append(cells)

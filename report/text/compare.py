@@ -15,7 +15,7 @@ from thermospindle.diagnosis.compare.correlation import Band
 from thermospindle.diagnosis.data.observe import FREQUENCY_FLOOR
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE
 from thermospindle.model.errors import listed
-from thermospindle.model.units import RPM
+from thermospindle.model.units import in_rpm
 from thermospindle.report.text.grid import grid, show_grid
 from thermospindle.report.typeset import known
 
@@ -45,7 +45,7 @@ def _test_json(t: TestComparison) -> dict[str, Any]:
     return {
         "id": t.test.id,
         "temperature_C": t.test.temperature,
-        "speed_rpm": t.test.speed / RPM,
+        "speed_rpm": in_rpm(t.test.speed),
         "modes": [_mode_json(m) for m in t.modes],
         "missing_Hz": list(t.missing),
         "extra_Hz": list(t.extra),
@@ -231,7 +231,7 @@ def _show_modes(console: Console, c: Comparison) -> None:
             error = (f"{m.error:+z.2f}", f"{100 * m.error / m.measured:+z.2f}", f"{m.residual:+z.1f}")
             name = t.test.id if m is t.modes[0] else ""
             frequencies = (f"{m.measured:.2f}", f"{m.sd:.2f}", f"{m.computed:.2f}")
-            beside = (damping, f"{100 * m.damping_computed:.3f}", damping_error, mac)
+            beside = (damping, f"{100 * m.damping_computed:z.3f}", damping_error, mac)
             rows.append([name, str(m.number), m.kind, *frequencies, *error, *beside])
     show_grid(console, "Modes, computed - measured", columns, rows, ("test", "kind"), keys=3)
     console.print(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from rich.console import Console
 from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.errors import listed
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, in_rpm
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, known, prose, table, write_csv
 from thermospindle.sim.operating import provenance
@@ -28,7 +28,7 @@ SHOWN = 18  # coincidences in the terminal and the report
 def map_json(found: ResonanceMap) -> dict[str, Any]:
     """Coincidences; modes over the grid [temperature][speed]; lines at the nominal condition; runout along both axes."""
     return {
-        "nominal": {"temperature_C": found.nominal.temperature, "speed_rpm": found.nominal.speed / RPM},
+        "nominal": {"temperature_C": found.nominal.temperature, "speed_rpm": in_rpm(found.nominal.speed)},
         "mapped": mapped(found),
         "sentences": [*sentences(found), *nearby(found)],
         "coincidences": [_coincidence_json(c) for c in found.coincidences],
@@ -47,10 +47,10 @@ def map_json(found: ResonanceMap) -> dict[str, Any]:
             }
             for t in found.lines
         ],
-        "grid": {"temperature_C": found.temperatures.tolist(), "speed_rpm": (found.speeds / RPM).tolist()},
+        "grid": {"temperature_C": found.temperatures.tolist(), "speed_rpm": [in_rpm(s) for s in found.speeds]},
         "nrro_um": {
-            "over_speed": _runout_json(found.nrro_speed, "speed_rpm", 1 / RPM),
-            "over_temperature": _runout_json(found.nrro_temperature, "temperature_C", 1.0),
+            "over_speed": _runout_json(found.nrro_speed, "speed_rpm", in_rpm),
+            "over_temperature": _runout_json(found.nrro_temperature, "temperature_C", float),
         },
         "interpolated": _interpolated_json(found),
         "imperfections": "of the scene" if found.drawn_from is None else f"drawn with seed {found.drawn_from}",
@@ -77,7 +77,7 @@ def _coincidence_json(c: Coincidence) -> dict[str, Any]:
         "line": c.line.name,
         "mode": c.mode.number,
         "temperature_C": c.condition.temperature,
-        "speed_rpm": c.condition.speed / RPM,
+        "speed_rpm": in_rpm(c.condition.speed),
         "frequency_Hz": c.frequency,
         "mode_frequency_Hz": c.mode_frequency,
         "bearing": c.line.bearing,
@@ -98,9 +98,9 @@ def _coincidence_json(c: Coincidence) -> dict[str, Any]:
     }
 
 
-def _runout_json(along: Array, name: str, unit: float) -> dict[str, list[float]]:
+def _runout_json(along: Array, name: str, told: Callable[[float], float]) -> dict[str, list[float]]:
     place, radial, axial = along.T
-    return {name: (unit * place).tolist(), "radial": (1e6 * radial).tolist(), "axial": (1e6 * axial).tolist()}
+    return {name: [told(x) for x in place], "radial": (1e6 * radial).tolist(), "axial": (1e6 * axial).tolist()}
 
 
 def mapped(found: ResonanceMap) -> str:
@@ -269,7 +269,7 @@ def write_map(found: ResonanceMap, folder: Path) -> None:
     names = list(coincidences[0]) if coincidences else ["line", "mode", "temperature_C", "speed_rpm", "frequency_Hz"]
     write_csv(folder / "coincidences.csv", names, (row.values() for row in coincidences), about)
     grid = [
-        [float(v) for v in (t, s / RPM, *(m.frequency[i, j] for m in found.modes))]
+        [float(v) for v in (t, in_rpm(s), *(m.frequency[i, j] for m in found.modes))]
         for i, t in enumerate(found.temperatures)
         for j, s in enumerate(found.speeds)
     ]

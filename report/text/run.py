@@ -13,7 +13,7 @@ from thermospindle.model.files.stiffness_table import write_table
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, in_rpm
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.text.states import modes_json, show_table, write_modes_csv
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
@@ -32,7 +32,7 @@ def impact_json(step: Step) -> dict[str, Any]:
     keys = ("frequency_Hz", "frequency_sd_Hz", "damping_ratio", "damping_ratio_sd")
     return {
         "temperature_C": step.point.condition.temperature,
-        "speed_rpm": step.point.condition.speed / RPM,
+        "speed_rpm": in_rpm(step.point.condition.speed),
         "modes": [dict(zip(keys, map(float, row), strict=True)) for row in rows],
     }
 
@@ -89,7 +89,7 @@ def show_impact(console: Console, step: Step) -> None:
     computed, shared = {k: step.point.modes[i] for i, k in seen.items()}, _shared(step, seen)
     for i, (f, sf, z, sz) in enumerate(zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)):
         exact = computed.get(i)
-        own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:.3f}")
+        own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:z.3f}")
         rows.append([f"{f:.2f}", _error(sf, 2), f"{100 * z:.3f}", _error(100 * sz, 3), *own])
     console.print(f"{_found(step, computed, set(shared.values()))}\n", highlight=False, markup=False)
     show_grid(console, title, ("f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%"), rows)

@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.model.machine import Spindle
-from thermospindle.model.units import RPM, TO_UM
+from thermospindle.model.units import TO_UM, in_rpm
 from thermospindle.report.text.grid import grid, show_grid
 from thermospindle.report.text.states import of_bearings
 from thermospindle.report.typeset import table, write_csv
@@ -62,12 +62,12 @@ def runout_json(runout: Runout, path: str, element: str, seed: int | None) -> di
     time = runout.averaged.time
     return {
         "temperature_C": condition.temperature,
-        "speed_rpm": condition.speed / RPM,
+        "speed_rpm": in_rpm(condition.speed),
         "status": runout.point.state.status,
         "seconds": runout.averaged.count / abs(runout.revolving),
         "revolutions": runout.averaged.count,
         "samples_per_revolution": len(time) // runout.averaged.count,
-        "seen_speed_rpm": condition.speed * runout.ratios[0] / RPM,
+        "seen_speed_rpm": in_rpm(condition.speed * runout.ratios[0]),
         "path": path,
         "element": element,
         "imperfections": "of the scene" if seed is None else f"drawn from seed {seed}",
@@ -81,7 +81,7 @@ def runout_json(runout: Runout, path: str, element: str, seed: int | None) -> di
         "statistics": STATISTICS | {"leakage_um": "most by which other lines can have changed the averaged RRO, zero to peak"},
         "lines": [line_json(line) for line in runout.lines],
         "probes": {
-            p.name: {"body": p.body, "position_mm": [1e3 * x for x in p.position], "direction": list(p.direction), "seen_speed_rpm": condition.speed * ratio / RPM, **quoted[p.name]}
+            p.name: {"body": p.body, "position_mm": [1e3 * x for x in p.position], "direction": list(p.direction), "seen_speed_rpm": in_rpm(condition.speed * ratio), **quoted[p.name]}
             for p, ratio in zip(runout.signals.probes, runout.ratios, strict=True)
         },
         "provenance": provenance(runout.point.spindle),

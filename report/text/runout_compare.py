@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.diagnosis.runout.compare import LineBeside, PartBeside, RunoutBeside, rms_residual
-from thermospindle.model.units import RPM, TO_UM
+from thermospindle.model.units import TO_UM, in_rpm
 from thermospindle.report.text.grid import grid, show_grid
 
 SHOWN = 12  # lines of a table
@@ -23,7 +23,7 @@ def runout_comparison_json(found: Sequence[RunoutBeside]) -> dict[str, Any]:
             {
                 "id": t.test.id,
                 "temperature_C": t.test.temperature,
-                "speed_rpm": t.test.speed / RPM,
+                "speed_rpm": in_rpm(t.test.speed),
                 "lines": [_line_json(g) for g in t.lines],
                 "rro": [_part_json(p) for p in t.rro],
                 "nrro": [_part_json(p) for p in t.nrro],

@@ -13,7 +13,7 @@ from thermospindle.diagnosis.runout.next_test import NextRunout
 from thermospindle.diagnosis.runout.sources import SourceKey
 from thermospindle.diagnosis.runout.verdict import CLEAR, RunoutDiagnosis
 from thermospindle.model.machine import Spindle
-from thermospindle.model.units import RPM, TO_UM
+from thermospindle.model.units import RPM, TO_UM, in_rpm
 from thermospindle.report.text.diagnosis.answer import named
 from thermospindle.report.text.diagnosis.words import behind, next_words, value_words
 from thermospindle.report.typeset import known
@@ -61,7 +61,7 @@ def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...], spi
             {
                 "id": s.test.id,
                 "temperature_C": s.condition.temperature,
-                "speed_rpm": s.condition.speed / RPM,
+                "speed_rpm": in_rpm(s.condition.speed),
                 "lines": len(s.seen),
                 "slip": s.slip,
             }

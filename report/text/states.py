@@ -18,7 +18,7 @@ from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy, to_real
 from thermospindle.model.rotor.static import Around, Static
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, in_rpm
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import write_csv
 from thermospindle.sim.operating import OperatingPoint
@@ -49,14 +49,14 @@ def table_json(table: StiffnessTable) -> dict[str, Any]:
 
     answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
     if len(table.speed) > 1:
-        answer["speeds"] = [{"speed_rpm": s / RPM, "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
+        answer["speeds"] = [{"speed_rpm": in_rpm(s), "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
     return answer | {"provenance": dict(table.provenance)}
 
 
 def modes_json(point: OperatingPoint, highest: float) -> dict[str, Any]:
     return {
         "temperature_C": point.condition.temperature,
-        "speed_rpm": point.condition.speed / RPM,
+        "speed_rpm": in_rpm(point.condition.speed),
         "status": point.state.status,
         "modes": [_mode_json(point, m) for m in point.modes_below(highest)],
     }
@@ -92,7 +92,7 @@ def write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
     elements = [e.name for e in points[0].chain.elements]
     head = ["temperature_C", "speed_rpm", "mode", "kind", "whirl", "frequency_Hz", "damping_ratio", *(f"energy_share_{name}" for name in elements)]
     rows = [
-        [p.condition.temperature, p.condition.speed / RPM, i, m.kind, m.whirl, m.frequency, m.damping_ratio, *(m.energy[e] for e in elements)]
+        [p.condition.temperature, in_rpm(p.condition.speed), i, m.kind, m.whirl, m.frequency, m.damping_ratio, *(m.energy[e] for e in elements)]
         for p in points
         for i, m in enumerate(p.modes, 1)
     ]
@@ -211,12 +211,15 @@ def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint, 
     rows = []
     for i, m in enumerate(answer["modes"], 1):
         shares = [f"{100 * m['energy'][g]:.1f}" for g in groups]
-        rows.append([str(i), f"{m['frequency_Hz']:.2f}", f"{100 * m['damping_ratio']:.3f}", m["kind"], m["whirl"], *shares])
+        rows.append([str(i), f"{m['frequency_Hz']:.2f}", f"{100 * m['damping_ratio']:z.3f}", m["kind"], m["whirl"], *shares])
     show_grid(console, title, columns, rows, ("kind", "whirl"), keys=2)
     console.print("The last columns share each mode's strain energy between the element groups.")
 
 
 # ---------------------------------------------------------------- a unit force
+
+SPRINGS = "bearings"
+"""Share of the compliance in what is of the bearings and is none of them: the springs of preloads."""
 
 
 def static_json(answers: Sequence[Around], bearings: str, beam: str) -> dict[str, Any]:
@@ -252,12 +255,15 @@ def show_static(console: Console, values: dict[str, Any], answers: Sequence[Arou
         console.print("axis: a force along it, on the axis at the point's height.")
     if not parts:
         return  # every point is free to move
+    shares = {part: [f"{100 * row['compliance_shares'].get(part, 0.0):z.1f}" for row in points.values()] for part in parts}
+    if set(shares.get(SPRINGS, ())) == {"0.0"}:  # preload springs, which act along the axis alone
+        del shares[SPRINGS]
     console.print()
     show_grid(
         console,
         "Share of the compliance at each point in every part, %",
-        ["point", *(f"{name}\n%" for name in parts)],
-        [[name, *("-" if row["free"] else f"{100 * row['compliance_shares'].get(part, 0.0):.1f}" for part in parts)] for name, row in points.items()],
+        ["point", *(f"{'preload springs' if part == SPRINGS else part}\n%" for part in shares)],
+        [[name, *("-" if row["free"] else share[i] for share in shares.values())] for i, (name, row) in enumerate(points.items())],
         words=("point",),
     )
 

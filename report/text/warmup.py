@@ -12,7 +12,7 @@ from rich.console import Console
 
 from thermospindle.model.errors import listed
 from thermospindle.model.types import Array
-from thermospindle.model.units import MINUTE, RPM
+from thermospindle.model.units import MINUTE, RPM, in_rpm
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, known, minus, power, write_csv
 from thermospindle.sim.operating import provenance
@@ -35,7 +35,7 @@ def warmup_json(warmup: Warmup) -> dict[str, Any]:
     return {
         "start_C": warmup.start,
         "air_C": warmup.air,
-        "speed_rpm": warmup.speed / RPM,
+        "speed_rpm": in_rpm(warmup.speed),
         "time_s": warmup.times.tolist(),
         "temperature_C": {g: [m.temperatures[g] for m in moments] for g in moments[0].temperatures},
         "preload_N": None if first is None else [m.preload[first] for m in moments],

@@ -13,7 +13,7 @@ from rich.console import Console
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, in_rpm
 from thermospindle.report.progress import progress_bar
 from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
@@ -175,7 +175,7 @@ def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None
             {
                 "id": t.id,
                 "temperature_C": t.temperature,
-                "speed_rpm": t.speed / RPM,
+                "speed_rpm": in_rpm(t.speed),
                 "responses": [] if t.frf is None else [*t.frf.response_nodes],
                 "references": [] if t.frf is None else [*t.frf.reference_nodes],
                 "lines": 0 if t.frf is None else len(t.frf.frequency),

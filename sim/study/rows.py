@@ -17,7 +17,7 @@ from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, Ou
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.rotor.static import displacement
-from thermospindle.model.units import RPM, TO_UM
+from thermospindle.model.units import RPM, TO_UM, in_rpm
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import OperatingPoint, operating_point, unloads
@@ -201,7 +201,7 @@ def _stiffness(point: OperatingPoint) -> Row:
 
 
 def _told(condition: Condition) -> Row:
-    return {"temperature_C": condition.temperature, "speed_rpm": float(f"{condition.speed / RPM:.12g}")}
+    return {"temperature_C": condition.temperature, "speed_rpm": in_rpm(condition.speed)}
 
 
 def _cell(value: Any) -> float | str:

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM, TO_UM
+from thermospindle.model.units import TO_UM, in_rpm
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.steady import steady_runout
 from thermospindle.sim.study.draws import FIRST_SET, SECOND_SET, imperfection_columns, inputs
@@ -41,7 +41,7 @@ def at_conditions(of: Cases, table: pa.Table) -> list[tuple[Told, pa.Table]]:
     found = []
     temperature, speed = numbers(table, "temperature_C"), numbers(table, "speed_rpm")
     for c in of.conditions:
-        rpm = float(f"{c.speed / RPM:.12g}")
+        rpm = in_rpm(c.speed)
         use = (temperature == c.temperature) & (speed == rpm)
         found.append(({"temperature_C": c.temperature, "speed_rpm": rpm}, table.filter(pa.array(use))))
     return found

@@ -132,3 +132,17 @@ def test_a_static_answer_asks_for_no_mass(tmp_path: Path, capsys: pytest.Capture
     assert answer["reactions_N"] == pytest.approx({"left": -b / (a + b), "right": -a / (a + b)}, rel=1e-6)
     assert main(["check", str(tmp_path), "--json"]) == 0
     assert not any("nothing holds" in words for words in json.loads(capsys.readouterr().out)["odd"])
+
+
+def test_a_preload_spring_is_told_by_its_name_where_it_gives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Beside the bearings stood a column "bearings" of zeros: the share of a spring that acts along the axis alone. A point along it has some."""
+    scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace("# preload_rate", "preload_rate").replace("# sprung_ring", "sprung_ring")
+    file = tmp_path / "spindle.toml"
+    for text, named in ((scene, False), (scene.replace('direction = "+Y"', 'direction = "+Z"', 1), True)):
+        file.write_text(text, encoding="utf-8")
+        assert main(["static", str(tmp_path)]) == 0
+        said = capsys.readouterr().out.split("Share")[1]
+        assert ("preload springs" in said, "bearings" in said) == (named, False)
+        assert main(["static", str(tmp_path), "--json"]) == 0
+        points = json.loads(capsys.readouterr().out)["points"]
+        assert any(row["compliance_shares"]["bearings"] > 5e-4 for row in points.values()) is named

@@ -1,15 +1,17 @@
 """What titles say of a state of equilibrium."""
 
 import io
+import json
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from thermospindle.cli import main
 from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.files.stiffness_table import StiffnessTable
-from thermospindle.model.units import RPM
-from thermospindle.report.text.states import of_bearings, show_told_table
+from thermospindle.model.units import RPM, in_rpm
+from thermospindle.report.text.states import of_bearings, show_modes, show_told_table
 
 
 @pytest.mark.parametrize(("status", "told"), [(IN_CONTACT, "bearings in contact"), ("lower and upper bearing lost contact", "lower and upper bearing lost contact")])
@@ -31,3 +33,21 @@ def test_the_least_and_the_most_are_told_where_they_lie_between():
     assert said_of([[30.0], [12.5], [30.0]]) == "From 20 to 60 C at 0 rpm: front radial stiffness 30.00 N/um (least 12.50 at 40 C)."
     both = said_of([[20.0, 10.0], [31.0, 22.0], [30.0, 25.0]], (0.0, 6000.0))
     assert both == "From 20 to 60 C and 0 to 6000 rpm: front radial stiffness 20.00 to 25.00 N/um (least 10.00 at 20 C and 6000 rpm, most 31.00 at 40 C and 0 rpm)."
+
+
+def test_an_undamped_mode_has_no_damping_less_than_nothing():
+    """Rounding made -0.000 % of it."""
+    mode = {"frequency_Hz": 286.23, "damping_ratio": -1e-16, "kind": "lateral", "whirl": "none", "energy": {"bar": 1.0}}
+    console = Console(record=True, width=100, file=io.StringIO())
+    show_modes(console, {"temperature_C": 20.0, "speed_rpm": 0.0, "status": IN_CONTACT, "modes": [mode]}, None, 5000.0)
+    said = console.export_text()
+    assert "0.000" in said
+    assert "-0.000" not in said
+
+
+@pytest.mark.parametrize("rpm", [24000.0, 5400.1, -333.3, 0.0])
+def test_a_speed_is_told_as_it_was_given(rpm, capsys):
+    """24000 rpm was 24000.000000000004."""
+    assert in_rpm(rpm * RPM) == rpm
+    assert main(["modes", "hdd_2003", "--speed", str(rpm), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["speed_rpm"] == rpm

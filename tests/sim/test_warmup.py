@@ -1,5 +1,6 @@
 """Warm-up: coupled and converged, balanced in heat, steady in the end; a chamber soak against Newton's law of a lumped body."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -261,11 +262,30 @@ def test_a_start_beyond_a_law_is_told_with_scene_and_key(spindle, coarse, start)
 
 
 def test_rigid_rings_that_run_away_on_the_way_are_told(tmp_path):
-    """Hot inner rings in a cold housing, rigidly preloaded: time, bearing, load and ring temperatures instead of a law that ends."""
+    """Hot inner rings in a cold housing, rigidly preloaded: time, bearing, loads by their names, ring temperatures and what they do, instead of a law that ends."""
     scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace('preload_kind = "spring" ', 'preload_kind = "rigid" ')
     (tmp_path / "spindle.toml").write_text("".join(line for line in scene.splitlines(True) if not line.startswith(("sprung_", "preload_rate"))), encoding="utf-8")
-    with pytest.raises(OutsideRange, match=r"at 120000 rpm the bearings run away after 0\.\d+ min: rear carries \d+ N, [\d.]+ times its \d+ N at the start, with its inner ring at 1\d\d C and its outer one at \d\d C"):
-        warm_up(load(tmp_path), 120000 * RPM, 20.0)
+    said = []
+    with pytest.raises(OutsideRange) as told:
+        warm_up(load(tmp_path), 120000 * RPM, 20.0, progress=said.append)
+    assert said, "nothing was told of how far it had come"
+    assert all(re.fullmatch(r"0\.[\d]+ of [\d.]+ min", words) for words in said)
+    words = re.search(
+        r"at 120000 rpm the bearings run away after 0\.\d+ min: rear has Palmgren's load of friction P1 = (\d+) N, [\d.]+ times its (\d+) N at the start \(axial load (\d+) N, at the start (\d+) N\), "
+        r"with its inner ring at 1\d\d C and its outer one at \d\d C, a difference that has used up its radial clearance; the load heats it further .* a preload of springs, or less of it, gives way to hot rings$",
+        str(told.value),
+    )
+    assert words, told.value
+    hot, cold, axial_hot, axial_cold = map(float, words.groups())
+    assert hot / cold == pytest.approx(axial_hot / axial_cold, rel=0.01)  # both of the same contact angle
+    assert cold > 2 * axial_cold
+
+
+def test_springs_are_no_advice_where_springs_are(tmp_path):
+    """A preload of springs was advised to a set that has one."""
+    (tmp_path / "spindle.toml").write_text((ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(OutsideRange, match=r"leave the range of a law after .*; thermal\.convection cools more, thermal\.friction heats less, and so does less preload or more radial clearance$"):
+        warm_up(load(tmp_path), 200000 * RPM, 20.0)
 
 
 @pytest.mark.slow

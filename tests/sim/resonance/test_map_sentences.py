@@ -109,6 +109,8 @@ def test_what_is_met_just_beyond_the_speeds_asked_for_is_told(spindle):
 
 def test_answer_as_json(met):
     answer = map_json(met)
+    assert answer["grid"]["speed_rpm"] == [6000.0, 7200.0, 8400.0]  # as they were given: the first was 6000.000000000001
+    assert set(answer["grid"]["speed_rpm"]) <= set(answer["nrro_um"]["over_speed"]["speed_rpm"])
     first = answer["coincidences"][0]
     for name in ("line", "mode", "temperature_C", "speed_rpm", "frequency_Hz", "bearing", "cause", "strength_um", "margin_percent"):
         assert name in first
