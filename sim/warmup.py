@@ -209,8 +209,8 @@ def _taken_up(state: PairState, name: str) -> str:
 def _remedy(spindle: Spindle, name: str | None = None) -> str:
     """What keeps the bearing `name`, or all of them, from running away; springs only where a preload has none."""
     rigid = any(s.spring is None for s in spindle.sets if name is None or name in s.bearings)
-    helps = "a preload of springs, or less of it, gives way to hot rings" if rigid else "so does less preload or more radial clearance"
-    return f"thermal.convection cools more, thermal.friction heats less, and {helps}"
+    helps = "a preload of springs, or less of it, which gives way to hot rings" if rigid else "less preload or more radial clearance"
+    return f"what helps is more cooling (thermal.convection), less friction (thermal.friction), or {helps}"
 
 
 @dataclass(frozen=True, eq=False)
