@@ -81,8 +81,8 @@ def free_forms(spindle: Spindle, reference: Condition | None = None) -> list[Mec
 
 
 def _tied(spindle: Spindle) -> list[Mechanism]:
-    """A spring between the ground and what turns: a seal that rubs, a hose, a tool that touches; one that pushes away is a magnet's (Earnshaw). It holds the middle, and across the
-    axis a shaft at any of its measuring points."""
+    """A spring between the ground and what turns: a seal that rubs, a hose, a tool that touches; one that pushes away is a magnet's (Earnshaw). It acts at
+    the middle, and on a shaft, across the axis, at any measuring point too."""
     if not any(b.turns for b in spindle.structure.bodies):
         return []
     low, high = spindle.hammer.band
