@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ class Law:
     shape: tuple[tuple[str, str, float, tuple[float, float]], ...] = ()
     has_offset: bool = False
 
-    @property
+    @cached_property
     def asks(self) -> tuple[bool, bool]:
         """Whether it depends on temperature, and on speed."""
         names = compile(self.expression, "law", "eval").co_names

@@ -228,11 +228,11 @@ def _elsewhere(word: str, form: type[BaseModel]) -> str:
 
 def _tables(name: str, form: Any) -> Iterator[tuple[str, list[str]]]:
     """The keys of a file's tables, by their names: those that have one, without what is in tables that are named freely."""
-    yield name, [field.alias or key for key, field in form.model_fields.items()]
+    yield name, _keys(form)
     for key, field in form.model_fields.items():
         inner = _table_in(field.annotation)
         if isinstance(inner, type) and issubclass(inner, BaseModel):
-            each = "list" in str(field.annotation)
+            each = get_origin(field.annotation) is list
             called = ".".join(filter(None, (name.strip("[]"), field.alias or key)))
             yield from _tables(f"[[{called}]]" if each else f"[{called}]", inner)
 
@@ -272,6 +272,11 @@ def _allowed_keys(form: Any, path: tuple[str | int, ...]) -> list[str]:
             table = _table_in(fields[part].annotation)
         elif len(inner := get_args(table)) > 1:  # a table by name; else the name of one of several forms that an entry may have
             table = _table_in(inner[1])
+    return _keys(table)
+
+
+def _keys(table: Any) -> list[str]:
+    """Keys as the file has them; none of what is no table."""
     return [field.alias or name for name, field in getattr(table, "model_fields", {}).items()]
 
 

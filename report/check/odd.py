@@ -100,9 +100,9 @@ def _massless(found: Looked) -> Iterator[str]:
         if not own or not all(own) or (grounded and not turns):
             continue
         regions = [g for g in spindle.regions if g.part == part]
-        left = [g.name for g in regions if g.name not in set().union(*own)]
-        tiles = {name: [t for t in cells(regions) if t.region == name] for name in left}
-        each = [f"{name!r} ({mass_properties(of, regions, dict(spindle.materials)).mass:.3g} kg)" for name, of in tiles.items() if of]
+        left, tiles = {g.name for g in regions}.difference(*own), cells(regions)
+        of_each = {g.name: [t for t in tiles if t.region == g.name] for g in regions if g.name in left}
+        each = [f"{name!r} ({mass_properties(of, regions, dict(spindle.materials)).mass:.3g} kg)" for name, of in of_each.items() if of]
         if each:
             yield f"section.regions: no body or shaft has the mass of {listed(each)}, {part}; regions of a body, or mass_regions of a shaft, may name {'it' if len(each) == 1 else 'them'}"
 

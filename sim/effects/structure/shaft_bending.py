@@ -54,8 +54,8 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
 
 
 def idle(spindle: Spindle) -> str | None:
-    flexible = {name for s in spindle.structure.shafts for name in s.bodies}
-    if flexible and all(b.inner_body in flexible for b in spindle.all_bearings):
+    structure = spindle.structure
+    if structure.shafts and all(structure.carrier(b.inner_body) != b.inner_body for b in spindle.all_bearings):
         return "its flexible shafts bend already"
     if not regions(spindle, "shaft"):
         return lacking("region", "shaft")
