@@ -125,9 +125,8 @@ class Correlation:
 
 
 def correlate(beside: Beside) -> Correlation | None:
-    """All correlations of one test; None where no bearing is in contact at its condition: FRFs of what then moves freely say nothing of a machine that was measured."""
-    state = beside.point.state
-    if state.bearings and not state.linear and not any(b.stiffness.any() for b in state.bearings):
+    """All correlations of one test; None where no bearing is in contact at its condition."""
+    if not beside.held:
         return None
     frequency, measured = beside.measured.frequency, beside.measured.value
     computed = beside.computed(frequency)

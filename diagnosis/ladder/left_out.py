@@ -83,14 +83,18 @@ def _without(model: CampaignModel, t: int, group: LeftOut) -> TestData:
 def missed(found: Settled, tests: Sequence[TestData], group: LeftOut) -> Missed:
     """How far `found`, which has not seen a group, is from it in `tests`.
 
-    With r the residuals there in standard errors of the data, J their derivatives by all parameters and S the covariance of these, the squares are
-    r (1 + J S J^T)^-1 r: what is not known of the left-out test itself (its temperature, its gains) is part of S, with its prior.
+    With r the residuals there in standard errors of the data, J their derivatives by all parameters and S = R R^T the covariance of these, the squares are
+    r (1 + J S J^T)^-1 r, the least that |r - J R z|^2 + |z|^2 can be: what is not known of the left-out test itself (its temperature, its gains) is part of S, with its prior.
+    They are found as those, for of a test that the fit is far from they are a small difference of large numbers.
     """
     model = replace(found.model, tests=tuple(tests))
     problem = Problem(model, found.mechanisms)
     point, covariance = found.posterior
     rates = rates_of(model, problem.parts(point)[0], problem.effects_of(point))
-    information, gradient, total, count = np.zeros((problem.length,) * 2), np.zeros(problem.length), 0.0, 0
+    size, directions = np.linalg.eigh(covariance)
+    root = directions * np.sqrt(np.maximum(size, 0.0))
+    off: list[Array] = []
+    by_known: list[Array] = []
     relative: list[Array] = []
     for t in group.tests:
         r, by = problem.linearised(t, point, rates)
@@ -98,17 +102,21 @@ def missed(found: Settled, tests: Sequence[TestData], group: LeftOut) -> Missed:
         if isinstance(data := tests[t], ModeData):
             of_frequency = own[: len(data.frequency)]
             relative.append(np.expm1(r[: len(of_frequency)] * data.frequency_sd)[of_frequency])
-        r, by = r[own], replace(by, rows=by.rows[:, own])
-        information[np.ix_(by.numbers, by.numbers)] += by.information
-        gradient[by.numbers] += by.products(r)
-        total += float(r @ r)
-        count += len(r)
-    size, directions = np.linalg.eigh(covariance)
-    root = directions * np.sqrt(np.maximum(size, 0.0))
-    half = root.T @ gradient
-    squares = total - float(half @ np.linalg.solve(np.eye(len(half)) + root.T @ information @ root, half))
-    off = np.concatenate(relative) if relative else np.zeros(0)
-    return Missed(squares, count, float(off @ off), len(off))
+        off.append(r[own])
+        by_known.append(by.whole[:, own].T @ root[by.numbers])
+    squares, count = least(np.concatenate(off), np.concatenate(by_known)), sum(map(len, off))
+    apart = np.concatenate(relative) if relative else np.zeros(0)
+    return Missed(squares, count, float(apart @ apart), len(apart))
+
+
+def least(r: Array, a: Array) -> float:
+    """The least of |r - a z|^2 + |z|^2 over z (n,), of r (N,) and a (N, n)."""
+    n = a.shape[1]
+    q = np.linalg.qr(np.concatenate([a, np.eye(n)]))[0]
+    whole = np.concatenate([r, np.zeros(n)])
+    for _ in range(2):  # once more, for of what is far within reach the first leaves rounding
+        whole = whole - q @ (q.T @ whole)
+    return float(whole @ whole)
 
 
 def _rows(data: TestData, modes: Array | None, count: int) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +21,9 @@ from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.compare import comparison_json, show_before_after, show_comparison
 from thermospindle.report.text.runout_compare import runout_comparison_json, show_errors, show_runout_comparison
 from thermospindle.report.verbs.answer import Answer, answered, check_out, with_effects, write_json
-from thermospindle.sim.campaign.beside import check_points, doubtful, left_out
+from thermospindle.sim.campaign.beside import check_points, doubtful
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
-from thermospindle.sim.importing.frfs.likeness import likenesses
+from thermospindle.sim.campaign.likeness import likenesses
 
 
 def compare(
@@ -68,7 +67,7 @@ def compare(
             turning[1](console)
 
     write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ()), name=whole.name, both=both if earlier else None))
-    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *left_out(tests), *_beyond(comparison), *_mistaken(spindle, tests, comparison)])
+    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *_beyond(comparison), *(likenesses(spindle, whole) or _louder(comparison))])
 
 
 def _beyond(c: Comparison) -> list[str]:
@@ -79,12 +78,6 @@ def _beyond(c: Comparison) -> list[str]:
         for t in c.tests
         if t.beyond
     ]
-
-
-def _mistaken(spindle: Spindle, tests: Campaign, c: Comparison) -> list[str]:
-    """Units, signs and channels that seem mistaken, or else a factor that all measured FRFs have beside the computed ones."""
-    borne = {t.test.id for t in c.tests if not t.beyond}
-    return likenesses(spindle, replace(tests, tests=tuple(t for t in tests.tests if t.id in borne))) or _louder(c)
 
 
 def _louder(c: Comparison) -> list[str]:

@@ -27,12 +27,12 @@ from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
 from thermospindle.report.verbs.answer import Answer, answered, check_out, with_effects, write_json
-from thermospindle.sim.campaign.beside import doubtful, left_out
+from thermospindle.sim.campaign.beside import doubtful
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
+from thermospindle.sim.campaign.likeness import likenesses
 from thermospindle.sim.effects import CATALOGUE
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.own import effect_of
-from thermospindle.sim.importing.frfs.likeness import likenesses
 
 
 def diagnose(
@@ -78,7 +78,7 @@ def diagnose(
         write_json("diagnosis.json")(folder, answer)
         _write(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()), name=whole.name)
 
-    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *left_out(tests), *likenesses(spindle, tests), *_found(found)])
+    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *likenesses(spindle, whole), *_found(found)])
 
 
 def _found(found: verdict.Diagnosis) -> list[str]:

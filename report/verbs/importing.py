@@ -145,7 +145,7 @@ OUTSIDE = 2.0
 
 def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
     """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz, Hz for rpm; and where nothing does, what the FRFs tell beside the scene's own."""
-    from thermospindle.sim.importing.frfs.likeness import likenesses  # as below
+    from thermospindle.sim.campaign.likeness import likenesses  # as below
 
     low, high = spindle.temperatures[0], spindle.temperatures[-1]
     first, last = spindle.hammer.band

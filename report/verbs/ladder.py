@@ -12,6 +12,7 @@ from thermospindle.report.text.ladder_table import growing, ladder_json, show_la
 from thermospindle.report.verbs.answer import Answer, answered, check_out, with_effects, write_json
 from thermospindle.sim.campaign.beside import doubtful
 from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.campaign.likeness import likenesses
 from thermospindle.sim.effects import by_name
 
 
@@ -36,4 +37,4 @@ def ladder(
         write_ladder(found, folder)
 
     write = write_json("ladder.json", pictures)
-    return answered(ladder_json(found), lambda console: show_ladder(console, found), out, asked, write, doubtful(spindle, tests))
+    return answered(ladder_json(found), lambda console: show_ladder(console, found), out, asked, write, [*doubtful(spindle, tests), *likenesses(spindle, tests)])

@@ -16,8 +16,9 @@ from thermospindle.report.workbench import words
 from thermospindle.report.workbench.bench import open_bench
 from thermospindle.report.workbench.explanations import read_explanations
 from thermospindle.report.workbench.server import serve, server
-from thermospindle.sim.campaign.beside import doubtful, left_out
+from thermospindle.sim.campaign.beside import doubtful
 from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.campaign.likeness import likenesses
 
 
 def workbench(
@@ -41,7 +42,7 @@ def workbench(
     doubts = [f"--diagnosis {diagnosis}: was made of another state of this scene; its tolerances may not fit"] if known and not known.of_scene else []
     doubts += [said for said in (words.not_shown(bench),) if said]
     if bench.campaign:
-        doubts += [*doubtful(bench.spindle, bench.campaign), *left_out(bench.campaign)]
+        doubts += [*doubtful(bench.spindle, bench.campaign), *likenesses(bench.spindle, bench.campaign)]
     out = Path("out") / f"{bench.spindle.name}_workbench" if out is None else out
     made, address = server(bench, out, known, port)
     values: dict[str, Any] = {"address": address, "token": address.rstrip("/").rpartition("/")[2], "pid": os.getpid(), "out": str(out), "warnings": doubts}

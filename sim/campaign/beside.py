@@ -35,6 +35,12 @@ class Beside:
         value = self.point.frf(frequency, self.test.window_decay) * s ** POWER[self.measured.quantity]
         return np.asarray(value[: len(self.measured.response_nodes)], complex)
 
+    @property
+    def held(self) -> bool:
+        """Whether any bearing is in contact: FRFs of what else moves freely say nothing of a machine that was measured."""
+        state = self.point.state
+        return bool(state.linear or not state.bearings or any(b.stiffness.any() for b in state.bearings))
+
 
 def check_points(spindle: Spindle, campaign: Campaign) -> None:
     """Raises `BadInput` for a campaign with a point on a body that the scene has not, or beyond the ends of a shaft."""
@@ -87,8 +93,8 @@ def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: C
 
 
 def doubtful(spindle: Spindle, campaign: Campaign) -> list[str]:
-    """What is odd about a campaign before it is compared with a scene, a sentence each."""
-    return [*of_another(spindle, campaign), *sense.of_conditions(spindle, [condition_of(t) for t in campaign.tests])]
+    """What is odd about a campaign before it is compared with a scene, a sentence each; what its FRFs tell beside the scene's own is `likeness`."""
+    return [*of_another(spindle, campaign), *sense.of_conditions(spindle, [condition_of(t) for t in campaign.tests]), *left_out(campaign)]
 
 
 def of_another(spindle: Spindle, campaign: Campaign) -> list[str]:

@@ -11,7 +11,7 @@ from thermospindle.diagnosis.inference.prior import CHANGING
 from thermospindle.diagnosis.ladder.fitting import settled, without
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, ladder
-from thermospindle.diagnosis.ladder.left_out import LeftOut, missed, unseen
+from thermospindle.diagnosis.ladder.left_out import LeftOut, least, missed, unseen
 from thermospindle.diagnosis.ladder.step import as_drawn
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput
@@ -47,6 +47,16 @@ def test_a_temperature_left_out_is_not_in_the_fit_that_predicts_it(spindle):
     assert found[0][2] == found[1][2] == 8
     assert found[0][1] < 25
     assert found[1][1] > 100 * 8
+
+
+def test_what_is_missed_is_no_difference_of_large_numbers():
+    """A reversed sensor puts a test 4e5 standard errors off, nearly all within reach of wide priors: as a difference of squares that came out negative, and its root was none.
+    In closed form, of columns c q with q orthonormal: what is across them, and |p|^2 / (1 + c^2) of p along them."""
+    random = np.random.default_rng(4)
+    q = np.linalg.qr(random.normal(size=(500, 21)))[0]
+    along, reach, across = 1e7 * random.normal(size=20), np.logspace(4, 8, 20), 3.0
+    r = q[:, :20] @ along + across * q[:, 20]
+    assert least(r, q[:, :20] * reach) == pytest.approx(across**2 + float(np.sum(along**2 / (1 + reach**2))), rel=1e-6)
 
 
 def test_a_mean_where_no_spindle_can_be_built_predicts_nothing(spindle):

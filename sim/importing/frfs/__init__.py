@@ -2,7 +2,6 @@
 
 =========  ===========================================================================================
 coherence  coherence beside the FRF that it is of, and what of it has no FRF
-likeness   imported FRFs beside the scene's: units and channels that seem mistaken
 one_test   from placed curves to the FRFs of one test: SI, one quantity, common lines, checks
 peaks      modes of FRFs that are magnitudes alone
 =========  ===========================================================================================

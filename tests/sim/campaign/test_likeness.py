@@ -11,11 +11,12 @@ import pytest
 from tests.conftest import DATA, SCENE
 from tests.sim.importing.exported import table
 from thermospindle.model.scene.reading import load
+from thermospindle.report.verbs import workbench as verb
 from thermospindle.report.verbs.compare import compare
 from thermospindle.report.verbs.importing import bring
+from thermospindle.sim.campaign import likeness
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign, write_campaign
-from thermospindle.sim.importing.frfs import likeness
-from thermospindle.sim.importing.frfs.likeness import likenesses
+from thermospindle.sim.campaign.likeness import likenesses
 from thermospindle.sim.importing.units import of_frf
 
 
@@ -85,13 +86,15 @@ def test_what_is_mistaken_in_one_test_is_said_of_it(spindle, foreign):
     assert said.startswith(f"tests {foreign.tests[0].id} and {foreign.tests[1].id}: all FRFs have the other sign")
 
 
-def test_a_comparison_says_it_of_a_campaign_that_was_imported_without_the_scene(foreign, tmp_path):
+def test_a_comparison_says_it_of_a_campaign_that_was_imported_without_the_scene(foreign, tmp_path, monkeypatch):
     """Of a sensor reversed in one test it told 0.538 as MAC, and no more."""
     fifth, p = np.where(np.arange(7) == 4, -1.0, 1.0)[:, None, None], load(SCENE).points[4]
     few = replace(foreign, tests=foreign.tests[:2])
     write_campaign(of_one(few, 1, lambda v: fifth * v), tmp_path / "c")
     [said] = compare(SCENE, tmp_path / "c").values["warnings"]
     assert said.startswith(f"test {few.tests[1].id}: the FRFs of response {p.node} ({p.name}) have the other sign")
+    monkeypatch.setattr(verb, "server", lambda *_: (None, "http://127.0.0.1:1/token/"))
+    assert verb.workbench(SCENE, tmp_path / "c", no_browser=True, out=tmp_path / "saved").values["warnings"] == [said]
     write_campaign(few, tmp_path / "d")
     assert compare(SCENE, tmp_path / "d").values["warnings"] == []
 

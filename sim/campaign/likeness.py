@@ -96,9 +96,9 @@ def _tests(spindle: Spindle, campaign: Campaign, scale: float = 1.0) -> dict[str
 
 
 def _pairs(spindle: Spindle, campaign: Campaign, test: Test, scale: float) -> list[Pair]:
-    """The FRFs of a test at some of its lines; none of a table of modes, or where the model has no answer."""
+    """The FRFs of a test at some of its lines; none of a table of modes, or where nothing holds the model, or it has no answer."""
     own = beside(spindle, campaign.points, test, condition_of(test))
-    if own is None or not len(own.measured.frequency):
+    if own is None or not own.held or not len(own.measured.frequency):
         return []
     step = -(-len(own.measured.frequency) // MOST_LINES)
     measured = own.measured.value[..., ::step]
