@@ -278,14 +278,16 @@ class Spindle:
         """Heights (m) between which the raceway of `bearing` lies on its region `ring`.
 
         The bearing's height plus and minus half its `raceway_width`, inside the region. Without a width the whole height of a region that
-        serves one bearing, and on one that several share `RACEWAY_WIDTH` ball diameters, or as much as the nearest row leaves, but no less than a ball.
+        serves one bearing, and on one that several share `RACEWAY_WIDTH` ball diameters, or as much as the nearest row leaves: half of what is between them, or what its own width
+        leaves; but no less than a ball.
         """
         region, width = self.region(ring), bearing.raceway_width
         if width is None:
-            sharing = [abs(b.z - bearing.z) for b in self.ringed if b.name != bearing.name and ring in (b.inner_ring, b.outer_ring)]
+            sharing = [b for b in self.ringed if b.name != bearing.name and ring in (b.inner_ring, b.outer_ring)]
             if not sharing:
                 return region.z
-            width = max(bearing.ball_diameter, min(RACEWAY_WIDTH * bearing.ball_diameter, *sharing))
+            left = [apart if b.raceway_width is None else 2 * apart - b.raceway_width for b in sharing for apart in [abs(b.z - bearing.z)]]
+            width = max(bearing.ball_diameter, min(RACEWAY_WIDTH * bearing.ball_diameter, *left))
         return max(region.z[0], bearing.z - width / 2), min(region.z[1], bearing.z + width / 2)
 
     def region(self, name: str) -> Region:

@@ -85,6 +85,9 @@ def test_raceways_of_a_tandem_pair_meet(tube):
     assert pair.raceway("tube", low) == pytest.approx((8.0e-3 - 0.945 * ball, 8.0e-3 + 0.945 * ball))
     assert pair.raceway("tube", high)[0] == pytest.approx(pair.raceway("tube", low)[1])
     check_raceways(Path("spindle.toml"), pair)
+    own = replace(tube, bearings=(low, replace(high, raceway_width=2.2 * ball)))  # a width that is told leaves the row beside less
+    assert own.raceway("tube", low)[1] == pytest.approx(own.raceway("tube", own.bearings[1])[0])
+    check_raceways(Path("spindle.toml"), own)
 
 
 def test_heat_enters_each_raceway_where_it_is(tube):
