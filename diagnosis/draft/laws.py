@@ -1,6 +1,6 @@
 """The simple laws that physics has over temperature T and speed n, and how each fits what drifts.
 
-None, linear, power, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there
+None, linear, power, exponential (that grows, or saturates), Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there
 everywhere beside it, weighted by the covariance over the tests; the Bayesian information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with
 as many parameters as it has temperatures, speeds, or pairs of these fits whatever changes over them: it is taken where chi2 rules all others out, and the file says that it is not tested.
 """
@@ -63,6 +63,7 @@ def of_temperature(reference: float, hottest: float) -> tuple[Law, ...]:
         Law("linear in temperature", f"({from_reference}) / 40"),
         Law("power of temperature", f"max(({from_reference}) / {hottest - reference:.6g}, 0.0) ** power", (POWER,)),
         Law("exponential in temperature", f"(exp(({from_hottest}) / scale) - {exponential}) / (1 - {exponential})", (SCALE,)),
+        Law("saturating exponential in temperature", f"(1 - exp(({reference:.6g} - T) / scale)) / (1 - {exponential})", (SCALE,)),
         Law("Arrhenius", f"(exp(activation * (1 / {hot} - 1 / (T + 273.15))) - {arrhenius}) / (1 - {arrhenius})", (ACTIVATION,)),
         Law("sigmoid in temperature", "1 / (1 + exp((middle - T) / width))", (("middle", "C", 40.0, (-40.0, 200.0)), ("width", "K", 4.0, (0.5, 40.0)))),
         Law("step in temperature", "where(T > middle, 1.0, 0.0)", (("middle", "C", 35.0, (-40.0, 200.0)),)),

@@ -14,6 +14,7 @@ PUT_IN = {
     "linear in temperature": (),
     "power of temperature": (0.6,),
     "exponential in temperature": (12.0,),
+    "saturating exponential in temperature": (9.0,),
     "sigmoid in temperature": (37.0, 2.0),
     "step in temperature": (35.0,),
     "linear in speed": (),
