@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Protocol, TypeVar
 from unicodedata import category
 
 LONGEST = 3000  # letters of a message
@@ -44,6 +45,23 @@ def instead(word: str, known: Iterable[str]) -> str:
     part = [name for name in names if word and (name.startswith(word) or word.startswith(name))]
     near = [*part, *get_close_matches(word, names, n=1)]
     return f"did you mean {near[0]}?" if near else f"allowed are {', '.join(names) or 'none'}"
+
+
+class Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+T = TypeVar("T", bound=Named)
+
+
+def named(name: str, things: Iterable[T], what: str) -> T:
+    """The one of some things that has a name; `BadInput` where none has, `what` being what they are."""
+    every = tuple(things)
+    for thing in every:
+        if thing.name == name:
+            return thing
+    raise BadInput(f"no {what} is called {name!r}; {instead(str(name), [t.name for t in every])}")
 
 
 def listed(names: Sequence[str]) -> str:

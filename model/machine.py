@@ -16,7 +16,7 @@ import numpy as np
 
 from thermospindle.model.bearing.definitions import Bearing, BearingSet, LinearBearing, RollerBearing
 from thermospindle.model.built.imperfections import Imperfections
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, named
 from thermospindle.model.material import Material, Viscosity
 from thermospindle.model.structure import Body, Structure
 
@@ -236,7 +236,7 @@ class Spindle:
 
     def bearing(self, name: str) -> Bearing:
         """The ball row of that name."""
-        return next(b for b in self.bearings if b.name == name)
+        return named(name, self.bearings, "ball row")
 
     def set_of(self, bearing: str) -> BearingSet:
         """The set a ball row is in."""
@@ -298,7 +298,11 @@ class Spindle:
         return {r.name: r for r in self.regions}
 
     def point(self, node: int) -> Point:
-        return next(p for p in self.points if p.node == node)
+        """The measuring point of that number; `BadInput` where there is none."""
+        for p in self.points:
+            if p.node == node:
+                return p
+        raise BadInput(f"no point has the node {node!r}; allowed are {', '.join(f'{p.node} ({p.name})' for p in self.points)}")
 
 
 T = TypeVar("T")

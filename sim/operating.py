@@ -77,8 +77,12 @@ class OperatingPoint:
         return found
 
     def spec(self, element: str = "linear", looks: bool = False) -> mujoco.MjSpec:
-        """The MuJoCo specification of this point."""
+        """The MuJoCo specification of this point; MuJoCo's own `to_xml` of it rounds to six digits, which `xml` does not."""
         return mjcf.spec(self.spindle, self.state, element, looks, self.chain)
+
+    def xml(self, element: str = "linear", looks: bool = False) -> str:
+        """The same as MJCF in full precision, which `mujoco.MjModel.from_xml_string` and the viewer open."""
+        return mjcf.xml(self.spec(element, looks))
 
     @cached_property
     def model(self) -> mujoco.MjModel:

@@ -58,10 +58,10 @@ def run(
     return Run(spindle, tuple(steps), measured_campaigns(spindle))
 
 
-def identify(test: ImpactTest) -> Modes:
-    """Modes of an impact test, with the damping of its exponential window taken out."""
+def identify(test: ImpactTest, highest: float = np.inf) -> Modes:
+    """Modes of an impact test up to `highest` Hz, with the damping of its exponential window taken out."""
     frf = _as_measured(test.estimate.h1)
-    return extract(frf.frequency, frf.value, frf.sd, kind=frf.quantity, window_decay=test.estimate.window_decay)
+    return extract(frf.frequency, frf.value, frf.sd, band=(0.0, highest), kind=frf.quantity, window_decay=test.estimate.window_decay)
 
 
 def measured_campaigns(spindle: Spindle) -> tuple[Campaign, ...]:

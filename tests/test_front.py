@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -42,6 +43,40 @@ def test_modes_are_those_of_the_model():
     own = operating_point(load(SCENE), Condition(60.0, 7200 * 2 * np.pi / 60)).modes
     assert [m.frequency for m in ts.modes(point)] == [m.frequency for m in own]
     assert len(ts.modes(point, highest_Hz=3000)) == 5
+
+
+@pytest.mark.parametrize("lines", [None, np.linspace(400.0, 3000.0, 2601)], ids=["default", "every 1 Hz"])
+def test_the_models_own_frfs_have_its_modes(lines):
+    """Without any noise, and no word of it: taken for exact to rounding they had five modes of eight, and others that are none; what symmetry forbids, rounding too, spoilt shapes."""
+    point = ts.point("hdd_2003", 20)
+    found = ts.modes(ts.frf(point, lines))
+    own = np.array([m.frequency for m in ts.modes(point, highest_Hz=6000 if lines is None else 3000)])
+    assert found.frequency == pytest.approx(own, abs=0.01)
+    assert np.all(np.abs(found.frequency - own) < 3 * found.frequency_sd)
+    assert found.rank_one
+    assert ts.modes(ts.frf(point, lines), highest_Hz=1600).frequency == pytest.approx(own[:2], abs=0.01)
+
+
+def test_modes_of_an_impact_test_end_where_they_are_told():
+    found = ts.modes(ts.impact(ts.point("hdd_2003", 20), hits=1), highest_Hz=1600)
+    assert found.frequency == pytest.approx([1002.0, 1545.0], abs=0.5)
+
+
+def test_values_stand_in_for_those_of_the_file():
+    """Preload with what follows from it, of a scene whose rows are shipped ones, too; and an effect's parameter."""
+    assert ts.point(ts.load("hdd_2003", values={"bearing_pair.preload_N": 20}), 20).state.bearing("upper").preload == pytest.approx(20.0)
+    told = ts.load("five_bearing").sets[0]
+    stiffer = ts.load("five_bearing", values={f"sets.{told.name}.preload_N": 2 * told.preload})
+    assert stiffer.sets[0].preload == 2 * told.preload
+    softer = ts.load("hdd_2003", values={"effects.bond_softening.hot_compliance": 12.5})
+    assert softer.effects[0].values == ts.add("hdd_2003", "bond_softening", hot_compliance=12.5).effects[0].values
+
+
+@pytest.mark.parametrize("scene", ["hdd_2003", "mk7702", "tailstock"])
+def test_mjcf_opens_as_it_is_told(scene):
+    """MuJoCo's own text has six digits, and a slender shaft's inertia is none in them."""
+    point = ts.point(scene, 20)
+    assert mujoco.MjModel.from_xml_string(point.xml()).body_mass == pytest.approx(point.model.body_mass, rel=1e-12)
 
 
 @pytest.mark.parametrize(("quantity", "power"), [("receptance", -1), ("mobility", 0), ("accelerance", 1)])
@@ -126,14 +161,35 @@ def test_frequencies_that_are_none_are_refused(wrong):
         (lambda p: ts.modes(p.spindle), "source: must be an operating point (ts.point), a virtual test (ts.impact) or FRFs (ts.frf), not a Spindle"),
         (lambda p: ts.frf(p.spindle), "source: must be an operating point (ts.point) or a virtual test (ts.impact), not a Spindle"),
         (lambda p: ts.impact(p.spindle), "point: must be an operating point (ts.point), not a Spindle"),
-        (lambda p: ts.load(None), "scene: must be a scene's folder or the name of a shipped one, not a NoneType"),
+        (lambda p: ts.load(None), "scene: must be a scene's folder or the name of a shipped one, not None"),
         (lambda p: ts.compare(p.spindle, [1]), "tests: must be a campaign (ts.campaign) or its folder, not a list"),
         (lambda p: ts.diagnose(p.spindle, DATA / "foreign_none", effects="preload_loss"), "effects = 'preload_loss': must be a list of names, as ['preload_loss']"),
-        (lambda p: p.state.bearing("uper"), "'uper' is no ball bearing here; did you mean upper?"),
+        (lambda p: p.state.bearing("uper"), "no ball bearing is called 'uper'; did you mean upper?"),
         (lambda p: ts.frf(p, [900.0])["hub_top0"], "'hub_top0': one of the FRFs is asked for by two nodes, response and reference, as frf[\"hub_top0\", \"hub_top90\"]"),
         (lambda p: ts.add("hdd_2003", "preload_loss", loss="x"), "loss = 'x': must be a finite number"),
         (lambda p: ts.deviate("hdd_2003", {"preload": -1.5}), "preload = -1.5: must be a relative deviation from -0.9 to 10"),
         (lambda p: ts.deviate("hdd_2003", {"preload": float("nan")}), "preload = nan: must be a finite number"),
+        (lambda p: ts.deviate("hdd_2003", []), "deviations: must be a mapping of relative deviations by name, not a list"),
+        (lambda p: ts.add("hdd_2003", 3), "effect: must be the name of an effect, or the path of a file of your own, not an int"),
+        (lambda p: ts.campaign(None), "folder: must be the folder of a campaign, not None"),
+        (lambda p: ts.read_log(None), "file: must be a Rerun log, not None"),
+        (lambda p: ts.load("hdd_2003", "own.py"), "effect_files = 'own.py': must be a list of paths of files, as ['own.py']"),
+        (lambda p: ts.load("hdd_2003", 3), "effect_files: must be a list of paths of files, not an int"),
+        (lambda p: ts.load("hdd_2003", values=[3]), "values: must be a mapping of values by their keys, not a list"),
+        (lambda p: ts.load("five_bearing", values={"sets.mid.preload_N": 3}), "values['sets.mid.preload_N']: sets.mid is not in the scene; allowed are front, rear"),
+        (lambda p: ts.load("hdd_2003", values={"effects.bond.hot_compliance": 3}), "values['effects.bond.hot_compliance']: no effect is called 'bond'; did you mean bond_softening?"),
+        (lambda p: ts.frf(p, []), "frequency_Hz = []: must be one row of positive numbers"),
+        (lambda p: ts.frf(p, ["1", "2"]), "frequency_Hz = ['1', '2']: must be one row of positive numbers"),
+        (lambda p: ts.frf(p, quantity=["mobility"]), "quantity = ['mobility']; allowed are receptance, mobility, accelerance"),
+        (lambda p: ts.impact(p, noise="no"), "noise: must be True or False, not a str"),
+        (lambda p: ts.modes(ts.frf(p, [900.0, 950.0])), "source: no modes can be found in its FRFs: 2 lines above 0 Hz in the band: at least 12 in rising order are needed"),
+        (lambda p: ts.modes(ts.frf(p, [900.0, 950.0, 800.0] * 9)), "source: no modes can be found in its FRFs: 27 lines above 0 Hz in the band: at least 12 in rising order are needed"),
+        (lambda p: ts.modes(ts.frf(p), highest_Hz=10), "source: no modes can be found in its FRFs: 0 lines above 0 Hz in the band: at least 12 in rising order are needed"),
+        (lambda p: p.spindle.bearing("mid"), "no ball row is called 'mid'; allowed are lower, upper"),
+        (
+            lambda p: p.spindle.point(99),
+            "no point has the node 99; allowed are 1 (hub_top0), 2 (hub_top90), 3 (hub_side0), 4 (hub_side90), 5 (seat0), 6 (seat90), 7 (base)",
+        ),
     ],
 )
 def test_an_argument_that_is_none_is_told_in_one_sentence(call, sentence):

@@ -107,6 +107,10 @@ def test_lost_contact_and_a_temperature_in_kelvin_are_told():
         (lambda: assert_damping(SCENE, mode="axial 2", at_C=20, percent="1", within=1), "percent = '1': must be a finite number"),
         (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=0, at_least_percent=1), "speed_rpm = 0: nothing turns"),
         (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=7200, at_least_percent=1, multiples=0), "multiples = 0: of the number of balls, up to which waviness counts; must be a whole number of 1 or more"),
+        (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=7200, at_least_percent=1, temperatures_C=20), "temperatures_C = 20: must be a list of temperatures"),
+        (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=7200, at_least_percent=1, temperatures_C=[]), "temperatures_C = []: must be a list of temperatures in C, one at least"),
+        (lambda: assert_frequency(None, mode=1, at_C=20, frequency_Hz=1, within=1), "scene: must be a spindle (ts.load), a scene's folder or the name of a shipped one, not None"),
+        (lambda: assert_split(SCENE, modes=3, at_C=20, split_Hz=1, within=1), "modes = 3: must be two modes"),
         (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=7200, at_least_percent=-1), "at_least_percent = -1: must be a finite number above 0"),
         (lambda: assert_split(SCENE, modes=("lateral 1",), at_C=20, split_Hz=1, within=1), "modes = ('lateral 1',): must be two modes"),
         (lambda: assert_agreement(SCENE, DATA / "foreign_bond", rms=float("inf")), "rms = inf: must be a finite number above 0"),
@@ -154,6 +158,18 @@ def test_every_assertion_holds_and_bites(check, told, change, said):
     check(SCENE, **told)
     with pytest.raises(AssertionError, match=said):
         check(SCENE, **(told | change))
+
+
+def test_a_line_that_crosses_between_two_temperatures_is_near():
+    """At 20 C some are 6 % below the mode, at 60 C 3 % above, and of each end alone nothing is to be said: at 50 C one is 0.01 % from it."""
+    told = {"mode": "lateral 1", "speed_rpm": 14400, "at_least_percent": 1.0}
+    with pytest.raises(AssertionError, match=r"6 lines come nearer") as error:
+        assert_margin(SCENE, **told)
+    assert "between 20 and 60 C: 30 fc (inner waviness of order 29 of bearing lower, forward) crosses it, from -5.92 to +2.73 %" in str(error.value)
+    for t in (20, 60):
+        assert_margin(SCENE, **told, temperatures_C=[t])
+    with pytest.raises(AssertionError, match=r"50 C: 30 fc .* -0.01 % from"):
+        assert_margin(SCENE, **told, temperatures_C=[50])
 
 
 def test_a_scene_that_changed_is_read_again(tmp_path):

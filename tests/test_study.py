@@ -57,6 +57,15 @@ def test_a_sweep_has_the_modes_of_every_condition(tmp_path, capsys):
     assert found[8.0, 0.0, 20.0, 0.0]["preload_N.upper"] == pytest.approx(8.0, rel=1e-9)
 
 
+def test_a_scene_whose_rows_are_shipped_is_swept(tmp_path, capsys):
+    """Every key of it was refused, for rows that its file does not describe."""
+    text = 'title = "t"\nkind = "sweep"\nscene = "five_bearing"\ntemperatures_C = [20]\nspeeds_rpm = [0]\n[vary]\n"sets.front.preload_N" = [100, 200]\n'
+    rows = study(tmp_path, text)[1]
+    assert json.loads(capsys.readouterr().out)["errors"] == 0
+    soft, stiff = (r["frequency_Hz"][0] for r in rows)
+    assert stiff > 1.02 * soft
+
+
 def test_modes_that_move_far_keep_their_number_by_shape(tmp_path, capsys):
     """A mount three times as stiff lifts axial modes past rocking ones, by up to 68 %: by frequency an axial mode passed for the rocking one that it came near."""
     text = 'title = "t"\nkind = "sweep"\nscene = "hdd_2003"\ntemperatures_C = [20]\nspeeds_rpm = [7200]\n[vary]\n'

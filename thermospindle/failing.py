@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from thermospindle.model.bearing.kinematics import Line
     from thermospindle.model.rotor.modes import Mode
     from thermospindle.sim.operating import OperatingPoint
 
@@ -17,6 +18,12 @@ NEIGHBOURS = 2  # modes shown on each side of the one in question
 
 def called(point: OperatingPoint, mode: str | int) -> str:
     return f"{point.spindle.name}: mode {mode}" if isinstance(mode, int) else f"{point.spindle.name}: {mode}"
+
+
+def named(line: Line) -> str:
+    order = f" of order {line.order}" if line.order else ""
+    whirl = {1: ", forward", -1: ", backward"}.get(line.whirl, "")
+    return f"{line.name} ({line.cause}{order}{f' of bearing {line.bearing}' if line.bearing else ''}{whirl})"
 
 
 def at_speed(speed: float) -> str:

@@ -11,11 +11,13 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy loads
 
+import reprlib
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 from numbers import Real
+from operator import methodcaller
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -28,6 +30,7 @@ from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.elements import HAMMER
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load as load_scene
+from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.options import FASTEST, HITS, HOTTEST, NEWTONS
 from thermospindle.sim.campaign.beside import POWER
@@ -41,22 +44,30 @@ from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.identification.modal import Modes, extract
 from thermospindle.sim.operating import OperatingPoint, doubts, operating_point
 from thermospindle.sim.run import identify
+from thermospindle.sim.study.variants import with_values
 
 if TYPE_CHECKING:
     from thermospindle.diagnosis.compare.compare import Comparison
     from thermospindle.diagnosis.verdict import Diagnosis
     from thermospindle.report.log.read import Log
 
+__tracebackhide__ = methodcaller("errisinstance", BadInput)  # pytest shows where it was asked
 LINES = 2000  # of an FRF over the scene's band, where no frequencies are given
 
 
-def load(scene: str | Path, effect_files: Sequence[str | Path] = ()) -> Spindle:
+def load(scene: str | Path, effect_files: Sequence[str | Path] = (), *, values: Mapping[str, Any] | None = None) -> Spindle:
     """The spindle of a scene: its folder, its `spindle.toml`, or the name of a shipped one like "hdd_2003".
 
-    `effect_files` hold effects of your own that the scene has.
+    `effect_files` hold effects of your own that the scene has. `values` stand in for those of the file, in its units, by dotted key with entries of lists by their name:
+    {"sets.main.preload_N": 200, "effects.bond_softening.compliance_hot": 10}, as in `[vary]` of a study.
     """
-    _kind("scene", scene, (str, Path), "a scene's folder or the name of a shipped one")
-    return equipped(load_scene(scene), [Path(f) for f in effect_files])[0]
+    of_kind("scene", scene, (str, Path), "a scene's folder or the name of a shipped one")
+    files = [Path(f) for f in _several("effect_files", effect_files, "paths of files")]
+    spindle, catalogue = equipped(load_scene(scene), files)
+    if not values:
+        return spindle
+    of_kind("values", values, (Mapping,), "a mapping of values by their keys")
+    return with_values(spindle, catalogue, values)
 
 
 def point(spindle: Spindle | str | Path, temperature_C: float, *, speed_rpm: float = 0.0) -> OperatingPoint:
@@ -94,7 +105,7 @@ def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.i
     Hz, `.damping` (m,), `.shape` (m, responses), and `.frequency_sd` (m,) and so on, their standard errors. FRFs of records under an exponential window
     exp(-d t) have its damping in them, d / (2 pi f) more of every mode: `window_decay` (1/s) takes it out; of an impact test it is known.
     """
-    _kind("source", source, (OperatingPoint, ImpactTest, Frf), "an operating point (ts.point), a virtual test (ts.impact) or FRFs (ts.frf)")
+    of_kind("source", source, (OperatingPoint, ImpactTest, Frf), "an operating point (ts.point), a virtual test (ts.impact) or FRFs (ts.frf)")
     if highest_Hz != np.inf:
         number("highest_Hz", highest_Hz, 0.0, np.inf)
     if window_decay != 0.0:
@@ -103,11 +114,12 @@ def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.i
             raise BadInput("window_decay: is of measured FRFs; an operating point has none, and of an impact test it is known")
     if isinstance(source, OperatingPoint):
         return source.modes_below(highest_Hz)
-    if isinstance(source, Frf):
-        use = source.frequency <= highest_Hz
-        sd = None if source.sd is None else source.sd[..., use]
-        return extract(source.frequency[use], source.value[..., use], sd, kind=source.quantity, window_decay=window_decay)
-    return identify(source)
+    try:
+        if isinstance(source, Frf):
+            return extract(source.frequency, source.value, source.sd, band=(0.0, highest_Hz), kind=source.quantity, window_decay=window_decay)
+        return identify(source, highest_Hz)
+    except ValueError as error:
+        raise BadInput(f"source: no modes can be found in its FRFs: {error}") from None
 
 
 def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = None, *, quantity: str = "mobility") -> Frf:
@@ -117,8 +129,8 @@ def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = No
     and standard errors at its own lines, with the damping of its exponential window in it (`test.estimate.window_decay`, 1/s, which `modes` takes out). `quantity`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N; responses are all points, references the
     hammer's.
     """
-    _kind("source", source, (OperatingPoint, ImpactTest), "an operating point (ts.point) or a virtual test (ts.impact)")
-    if quantity not in POWER:
+    of_kind("source", source, (OperatingPoint, ImpactTest), "an operating point (ts.point) or a virtual test (ts.impact)")
+    if not isinstance(quantity, str) or quantity not in POWER:
         raise BadInput(f"quantity = {quantity!r}; allowed are {', '.join(POWER)}")
     spindle = source.spindle if isinstance(source, OperatingPoint) else source.point.spindle
     names = {p.node: p.name for p in spindle.points}
@@ -129,12 +141,7 @@ def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = No
         factor = (2j * np.pi * found.frequency) ** POWER[quantity]
         sd = None if found.sd is None or not np.all(np.isfinite(found.sd)) else found.sd * np.abs(factor)
         return replace(found, value=found.value * factor, sd=sd, quantity=quantity, names=names)
-    try:
-        lines = np.linspace(*spindle.hammer.band, LINES) if frequency_Hz is None else np.atleast_1d(np.asarray(frequency_Hz, float))
-    except (TypeError, ValueError):
-        raise BadInput(f"frequency_Hz = {frequency_Hz!r}: must be one row of positive numbers") from None
-    if lines.ndim != 1 or not np.all(np.isfinite(lines)) or np.any(lines <= 0):
-        raise BadInput("frequency_Hz: must be one row of positive numbers")
+    lines = np.linspace(*spindle.hammer.band, LINES) if frequency_Hz is None else _lines(frequency_Hz)
     value = source.frf(lines) * (2j * np.pi * lines) ** POWER[quantity]
     return Frf(lines, value, tuple(names), spindle.hammer.hammer_nodes, quantity, names=names)
 
@@ -153,7 +160,7 @@ def impact(
     `hits` on each hammer point and their peak force `level_N` are the scene's by default; `element` "ball-by-ball" takes contact laws instead of
     linear bearings, "reduced" is computed with the modes alone. `.record` is what the analyser sampled; `ts.frf(test)` and `ts.modes(test)` follow from it.
     """
-    _kind("point", point, (OperatingPoint,), "an operating point (ts.point)")
+    of_kind("point", point, (OperatingPoint,), "an operating point (ts.point)")
     if hits is not None:
         _whole("hits", hits, 1, HITS)
     if level_N is not None:
@@ -161,6 +168,7 @@ def impact(
     if element not in HAMMER:
         raise BadInput(f"element = {element!r}: {instead(str(element), HAMMER)}")
     _whole("seed", seed, 0, 10**18 - 1)
+    of_kind("noise", noise, (bool,), "True or False")
     changes = {key: value for key, value in (("hits", hits), ("level", level_N)) if value is not None}
     settings = replace(point.spindle.hammer, **changes)  # type: ignore[arg-type]
     return impact_tests([point], settings, element, seed, noise)[0]
@@ -168,6 +176,7 @@ def impact(
 
 def campaign(folder: str | Path) -> Campaign:
     """A campaign of tests, measured or virtual; `spindle import` makes one of your own files. `.tests[0].frf` and `.modes` hold what was measured."""
+    of_kind("folder", folder, (str, Path), "the folder of a campaign")
     return read_campaign(Path(folder))
 
 
@@ -192,9 +201,7 @@ def diagnose(
     from thermospindle.diagnosis.runout.lines import modal_tests
     from thermospindle.diagnosis.verdict import diagnose as search
 
-    if isinstance(effects, str):
-        raise BadInput(f"effects = {effects!r}: must be a list of names, as [{effects!r}]")
-    catalogue = CATALOGUE if effects is None else tuple(by_name(name) for name in effects)
+    catalogue = CATALOGUE if effects is None else tuple(by_name(name) for name in _several("effects", effects, "names"))
     return search(_spindle(spindle), modal_tests(_campaign(tests)), catalogue, progress)
 
 
@@ -205,7 +212,7 @@ def answer(found: Diagnosis | Comparison) -> dict[str, Any]:
     from thermospindle.diagnosis.compare.compare import Comparison as Beside
     from thermospindle.diagnosis.verdict import Diagnosis as Found
 
-    _kind("found", found, (Found, Beside), "a diagnosis (ts.diagnose) or a comparison (ts.compare)")
+    of_kind("found", found, (Found, Beside), "a diagnosis (ts.diagnose) or a comparison (ts.compare)")
     if isinstance(found, Beside):
         from thermospindle.report.text.compare import comparison_json
 
@@ -222,6 +229,7 @@ def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> S
     Nothing is written; `spindle add` writes a scene.
     """
     drawing = _spindle(spindle)
+    of_kind("effect", effect, (str, Path), "the name of an effect, or the path of a file of your own")
     found = fitted_to(effect_of(effect) if isinstance(effect, Path) else by_name(effect, (*CATALOGUE, *installed())), drawing)
     if why := refusal(found, drawing):
         raise BadInput(f"effect {found.name}: {why}")
@@ -238,6 +246,7 @@ def deviate(spindle: Spindle | str | Path, deviations: Mapping[str, float]) -> S
 
     The names are those of `[build.deviations]` of a scene; nothing is written.
     """
+    of_kind("deviations", deviations, (Mapping,), "a mapping of relative deviations by name")
     for name, value in deviations.items():
         if not LEAST <= number(name, value) <= MOST:
             raise BadInput(f"{name} = {value:g}: must be a relative deviation from {LEAST:g} to {MOST:g}")
@@ -248,21 +257,41 @@ def read_log(file: str | Path) -> Log:
     """Everything in a Rerun log (`.rrd`) of this program, FRFs back as numbers in `.frfs`."""
     from thermospindle.report.log.read import read_log as read
 
+    of_kind("file", file, (str, Path), "a Rerun log")
     return read(Path(file))
 
 
-def _kind(name: str, value: object, kinds: tuple[type, ...], told: str) -> None:
+def of_kind(name: str, value: object, kinds: tuple[type, ...], told: str) -> None:
+    """`BadInput` for an argument of another kind than it is told to be."""
     if not isinstance(value, kinds):
-        raise BadInput(f"{name}: must be {told}, not {'an' if type(value).__name__[0] in 'AEIO' else 'a'} {type(value).__name__}")
+        of = type(value).__name__
+        raise BadInput(f"{name}: must be {told}, not {'None' if value is None else f'an {of}' if of[0].lower() in 'aeio' else f'a {of}'}")
+
+
+def _several(name: str, value: Sequence[Any], told: str) -> Sequence[Any]:
+    if isinstance(value, str | Path):
+        raise BadInput(f"{name} = {value!r}: must be a list of {told}, as [{value!r}]")
+    of_kind(name, value, (Sequence,), f"a list of {told}")
+    return value
+
+
+def _lines(frequency_Hz: ArrayLike) -> Array:
+    try:
+        lines = np.atleast_1d(np.asarray(frequency_Hz))
+    except (TypeError, ValueError):
+        lines = np.zeros(0)
+    if lines.dtype.kind not in "iuf" or lines.ndim != 1 or not lines.size or not np.all(np.isfinite(lines)) or np.any(lines <= 0):
+        raise BadInput(f"frequency_Hz = {reprlib.repr(frequency_Hz)}: must be one row of positive numbers")
+    return np.asarray(lines, float)
 
 
 def _spindle(spindle: Spindle | str | Path) -> Spindle:
-    _kind("spindle", spindle, (Spindle, str, Path), "a spindle (ts.load), a scene's folder or the name of a shipped one")
+    of_kind("spindle", spindle, (Spindle, str, Path), "a spindle (ts.load), a scene's folder or the name of a shipped one")
     return spindle if isinstance(spindle, Spindle) else load(spindle)
 
 
 def _campaign(tests: Campaign | str | Path) -> Campaign:
-    _kind("tests", tests, (Campaign, str, Path), "a campaign (ts.campaign) or its folder")
+    of_kind("tests", tests, (Campaign, str, Path), "a campaign (ts.campaign) or its folder")
     return tests if isinstance(tests, Campaign) else campaign(tests)
 
 

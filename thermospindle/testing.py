@@ -19,7 +19,7 @@ from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thermospindle.failing import at_speed, behind, called, energy, odd, table
+from thermospindle.failing import at_speed, behind, called, energy, named, odd, table
 
 if TYPE_CHECKING:
     from thermospindle.model.machine import Spindle
@@ -128,7 +128,7 @@ def assert_split(scene: Scene, *, modes: tuple[str | int, str | int], at_C: floa
     from thermospindle.model.errors import BadInput
 
     _asked(["within"], split_Hz=split_Hz, within=within)
-    if isinstance(modes, str) or len(modes) != 2:
+    if not isinstance(modes, tuple | list) or len(modes) != 2:
         raise BadInput(f'modes = {modes!r}: must be two modes, as ("rocking 1", "rocking 2")')
     point = _of(scene, at_C, speed_rpm)
     first, second = (_index(point, m) for m in modes)
@@ -140,12 +140,12 @@ def assert_split(scene: Scene, *, modes: tuple[str | int, str | int], at_C: floa
 
 
 def assert_margin(
-    scene: Scene, *, mode: str | int, speed_rpm: float, at_least_percent: float, temperatures_C: Sequence[float] = (), multiples: int = 3
+    scene: Scene, *, mode: str | int, speed_rpm: float, at_least_percent: float, temperatures_C: Sequence[float] | None = None, multiples: int = 3
 ) -> None:
     """No line of the bearings or the unbalance comes nearer to the mode than `at_least_percent` of its frequency.
 
     Lines in the mode's own direction count, of waviness up to `multiples` of the number of balls; at every temperature given, the ends of the
-    scene's range by default. The mode is named at the first and followed by its shape.
+    scene's range by default, and between two where it is on one side of the mode at the one and on the other at the other. The mode is named at the first and followed by its shape.
     """
     __tracebackhide__ = True
     from thermospindle.model.bearing.kinematics import lines, row_kinematics
@@ -158,18 +158,28 @@ def assert_margin(
     if not isinstance(multiples, Integral) or multiples < 1:
         raise BadInput(f"multiples = {multiples!r}: of the number of balls, up to which waviness counts; must be a whole number of 1 or more")
     spindle = _loaded(scene)
-    points = [_point(spindle, t, speed_rpm) for t in (temperatures_C if len(temperatures_C) else spindle.temperatures)]
+    at = spindle.temperatures if temperatures_C is None else temperatures_C
+    if not isinstance(at, Sequence) or isinstance(at, str) or not at:
+        raise BadInput(f"temperatures_C = {temperatures_C!r}: must be a list of temperatures in C, one at least")
+    points = [_point(spindle, t, speed_rpm) for t in at]
     index = _index(points[0], mode)
     near: list[tuple[float, str]] = []
-    for point in points:
+    before: dict[str, tuple[float, float]] = {}
+    for point in sorted(points, key=lambda p: p.condition.temperature):
         check_centred(point.spindle, point.state, "assert_margin")
         own = _partner(points[0], point, index, _partners(points[0], point))
+        found, temperature = {}, point.condition.temperature
         for line in lines(point.spindle, row_kinematics(point.spindle, point.state), point.condition.speed, multiples):
             if (line.direction == "axial") == (own.kind == "axial"):
                 percent = 100 * (line.frequency - own.frequency) / own.frequency
-                bearing = f" of bearing {line.bearing}" if line.bearing else ""
-                near.append((percent, f"{point.condition.temperature:g} C: {line.name} ({line.cause}{bearing}) at {line.frequency:.1f} Hz, {percent:+.2f} % from {own.frequency:.1f} Hz"))
-    close = sorted((row for row in near if abs(row[0]) < at_least_percent), key=lambda row: abs(row[0]))
+                near.append((percent, f"{temperature:g} C: {named(line)} at {line.frequency:.1f} Hz, {percent:+.2f} % from {own.frequency:.1f} Hz"))
+                found[named(line)] = temperature, percent
+        for name in found.keys() & before.keys():
+            (cold, below), (hot, above) = before[name], found[name]
+            if below * above < 0:
+                near.append((0.0, f"between {cold:g} and {hot:g} C: {name} crosses it, from {below:+.2f} to {above:+.2f} %"))
+        before = found
+    close = sorted({row for row in near if abs(row[0]) < at_least_percent}, key=lambda row: (abs(row[0]), row[1]))
     if close:
         head = f"{called(points[0], mode)}{at_speed(speed_rpm)}: {len(close)} lines come nearer than {at_least_percent:g} %; the nearest are"
         raise AssertionError("\n".join([head, *(f"  {text}" for _, text in close[:5]), *energy(points[0], index), *odd(*points)]))
@@ -196,9 +206,13 @@ def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) ->
 
 def _loaded(scene: Scene) -> Spindle:
     __tracebackhide__ = True
-    if not isinstance(scene, str | Path):
-        return scene
+    from thermospindle.front import of_kind
+    from thermospindle.model.machine import Spindle
     from thermospindle.model.scene.reading import scene_path
+
+    of_kind("scene", scene, (Spindle, str, Path), "a spindle (ts.load), a scene's folder or the name of a shipped one")
+    if isinstance(scene, Spindle):
+        return scene
 
     file = scene_path(scene)
     return _read(file.resolve(), file.stat().st_mtime_ns)

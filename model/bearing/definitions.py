@@ -148,5 +148,5 @@ class BearingSet:
 
     name: str
     bearings: tuple[str, ...]
-    preload: float  # N, axial, at the reference temperature
+    preload: float  # N, axial, at the reference temperature; its rows have their share of it, and the contact angle that it gives: `model.built.tolerance.scaled_preload` changes all three
     spring: PreloadSpring | None = None  # None for rings fixed in their seats, and for rows loaded from outside

@@ -22,7 +22,7 @@ from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.row import row_at
 from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
 from thermospindle.model.changed import changed
-from thermospindle.model.errors import BadInput, NoEquilibrium, instead
+from thermospindle.model.errors import BadInput, NoEquilibrium, named
 from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, Spindle, kept
 from thermospindle.model.types import Array
 
@@ -90,7 +90,7 @@ class PairState:
 
     def any_bearing(self, name: str) -> BearingState | LinearState:
         """The ball row, roller bearing, or bearing given by numbers, of that name."""
-        return next(b for b in self.all_bearings if b.name == name)
+        return named(name, self.all_bearings, "bearing")
 
     @property
     def rollers(self) -> dict[str, RollerState]:
@@ -99,10 +99,7 @@ class PairState:
 
     def bearing(self, name: str) -> BearingState:
         """A ball row's state. Raises `BadInput` naming those there are."""
-        for b in self.bearings:
-            if b.name == name:
-                return b
-        raise BadInput(f"{name!r} is no ball bearing here; {instead(str(name), [b.name for b in self.bearings])}")
+        return named(name, self.bearings, "ball bearing")
 
 
 def check_centred(spindle: Spindle, state: PairState, what: str) -> None:

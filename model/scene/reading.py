@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
+from operator import methodcaller
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,7 @@ from thermospindle.model.scene.checks import check_bearings, check_raceways, che
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.shaft import SAME_HEIGHT
 
+__tracebackhide__ = methodcaller("errisinstance", BadInput)  # pytest shows where it was asked
 ROW_KINDS = ("ball_rows", "roller_rows")
 SCENES = Path(__file__).parents[2] / "scenes"
 """The shipped scenes: beside the packages, in a checkout as installed."""
@@ -81,11 +83,7 @@ def shipped() -> tuple[str, ...]:
 
 def build(raw: dict[str, Any], file: Path) -> Spindle:
     """The spindle of the parsed TOML `raw`; `file` serves messages only."""
-    raw = with_shipped_rows(migrated(SCENE, raw, file))
-    try:
-        form = scene_file.Scene.model_validate(raw)
-    except ValidationError as error:
-        raise BadInput(scene_file.first_error(file, raw, scene_file.Scene, error)) from None
+    raw, form = formed(raw, file)
     _check_catalogues(form, file)
     spindle = form.spindle(name=file.parent.name, file=file, provenance=_provenance(file, raw))
     spindle = _with_shafts(file, spindle)
@@ -112,6 +110,15 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
 def shipped_rows() -> dict[str, dict[str, Any]]:
     """The bearings that come with the program (`scenes/bearings.toml`): tables of `ball_rows` and `roller_rows` by name."""
     return read_file(SCENE, SCENES / "bearings.toml")
+
+
+def formed(raw: Mapping[str, Any], file: Path) -> tuple[dict[str, Any], scene_file.Scene]:
+    """Parsed TOML in today's format, with the shipped rows that it names, and as the form of a scene; `BadInput` where it does not fit that."""
+    whole = with_shipped_rows(migrated(SCENE, dict(raw), file))
+    try:
+        return whole, scene_file.Scene.model_validate(whole)
+    except ValidationError as error:
+        raise BadInput(scene_file.first_error(file, whole, scene_file.Scene, error)) from None
 
 
 def with_shipped_rows(raw: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from rich.console import Console
 
 from thermospindle.model.files.stiffness_table import write_table
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.units import RPM, in_rpm
 from thermospindle.report.text.grid import show_grid
@@ -67,7 +66,7 @@ def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
     write_modes_csv(points, folder / "modes.csv")
     for point in points:
         name = f"spindle_{point.condition.temperature:g}C.xml"
-        (folder / name).write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
+        (folder / name).write_text(point.xml(looks=True), encoding="utf-8")
     progress("tables and MuJoCo models written")
     write_campaign_of(run, folder / "campaign")
     progress("campaign written")

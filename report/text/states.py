@@ -14,7 +14,6 @@ from thermospindle.model.bearing.state import ALIKE
 from thermospindle.model.errors import listed
 from thermospindle.model.files.stiffness_table import BETWEEN, FURTHER, PRESSURE, StiffnessTable
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS
-from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy, to_real
 from thermospindle.model.rotor.static import Around, Static
 from thermospindle.model.types import Array
@@ -84,7 +83,7 @@ def _shape_json(point: OperatingPoint, mode: Mode) -> list[dict[str, Any]]:
 
 def write_modes(point: OperatingPoint, folder: Path) -> None:
     """`modes.csv` and the MuJoCo model `spindle.xml` of one operating point."""
-    (folder / "spindle.xml").write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
+    (folder / "spindle.xml").write_text(point.xml(looks=True), encoding="utf-8")
     write_modes_csv([point], folder / "modes.csv")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import combinations
+from operator import methodcaller
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from thermospindle.model.types import Array
 from thermospindle.sim.identification.modal import KINDS, scatter
 from thermospindle.sim.identification.running_lines import RunningLines, running_lines
 
+__tracebackhide__ = methodcaller("errisinstance", BadInput)  # pytest shows where it was asked
 TO_POWER = {"receptance": 1j, "mobility": 1.0, "accelerance": -1j}
 """What an FRF may be, with the phase that turns it to mobility."""
 POWER = {"receptance": -1, "mobility": 0, "accelerance": 1}

@@ -25,6 +25,9 @@ MOST_LINES = 6400
 """Of an FRF: half a minute's record of a spindle has tens of thousands, which tell little more of where poles are."""
 STEP, SURE = 0.3, 5.0
 """Of an FRF, from one line to the next, and of its standard errors, from which it changes much."""
+LEAST, FLOOR = 1e-3, 1e-5
+"""Of an FRF, and of the largest to its reference, the noise that it is taken to have at least where none is told: a model's own FRFs have none at all, what modes beyond the band do is a polynomial
+within it to that, and what symmetry forbids is rounding."""
 FAINT = 4.0
 """A mode is reported if its squared shape, weighted by its information, exceeds this many times what the information criterion asks."""
 
@@ -89,6 +92,11 @@ def scatter(frf: ArrayLike, window: int = 41) -> Array:
     return np.pad(np.maximum(absolute, larger), ((0, 0), (0, 0), (1, 1)), mode="edge")
 
 
+def _own_noise(frf: ComplexArray) -> Array:
+    """The `scatter` of FRFs (n_resp, n_ref, n), or what they have at least."""
+    return np.maximum(scatter(frf), noise_model(frf, LEAST, FLOOR))
+
+
 def extract(
     frequency: ArrayLike,
     frf: ArrayLike,
@@ -100,7 +108,7 @@ def extract(
 ) -> Modes:
     """Modes within `band` (Hz, all lines if None) of `frf` (n_resp, n_ref, n) at `frequency` (n,) Hz, with noise `frf_sd` of that shape.
 
-    Without `frf_sd` it is taken from the `scatter` of neighbouring lines, as the status records. Lines at 0 Hz are left out. Records
+    Without `frf_sd` it is taken from the `scatter` of neighbouring lines, as the status records, as `LEAST` of the FRF and `FLOOR` of the largest to its reference at least. Lines at 0 Hz are left out. Records
     under an exponential window exp(-window_decay t), 1/s, give H at s = i w + window_decay, and are taken so. Of more than `MOST_LINES` one in so many
     is taken where FRFs change little. Not reported
     are modes out of the band or with a damping that is not `BELIEVED`, `FAINT`, or not known better than to their half-width by the fit alone: what enlarges errors beyond that takes none away.
@@ -111,13 +119,14 @@ def extract(
         raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
     if frf.ndim != 3 or frequency.shape != frf.shape[2:]:
         raise ValueError(f"frf {frf.shape} is not (responses, references, lines) for {frequency.shape} frequencies")
-    low, high = band or (frequency[0], frequency[-1])
+    low, high = band or (-np.inf, np.inf)
     used = (frequency >= low) & (frequency <= high) & (frequency > 0)
     given = frf_sd is not None
-    sd = np.broadcast_to(np.asarray(frf_sd, float), frf.shape)[..., used] if given else scatter(frf[..., used])
     frequency, frf = frequency[used], frf[..., used]
     if len(frequency) < 12 or (np.diff(frequency) <= 0).any():
         raise ValueError(f"{len(frequency)} lines above 0 Hz in the band: at least 12 in rising order are needed")
+    with np.errstate(over="ignore"):
+        sd = np.broadcast_to(np.asarray(frf_sd, float), (*frf.shape[:2], len(used)))[..., used] if given else _own_noise(frf)
     if not (np.isfinite(frf).all() and np.isfinite(sd).all() and (sd > 0).all()):
         raise ValueError("the FRF must be finite and its noise finite and positive at every line")
     unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])

@@ -64,10 +64,10 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
     strained: list[tuple[float, Fit]] = []
     if min(responses, references) > 1:
         for trial in (make() for make in (lambda: free, lambda: split(lines, free))):
-            fit = refine(lines, start_rank_one(lines, trial), 1e-3)
-            constraints, rise = trial.unknowns - fit.unknowns, (fit.chi2 - trial.chi2) / trial.scale()
-            if one_shape(lines, fit, same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95)).any():
+            fit = _joined(lines, refine(lines, start_rank_one(lines, trial), 1e-3))
+            if fit is None:
                 continue
+            constraints, rise = trial.unknowns - fit.unknowns, (fit.chi2 - trial.chi2) / trial.scale()
             if rise < by_noise(lines, constraints):
                 return lines, whole(lines, fit), 1.0
             if not better(lines, trial, fit):
@@ -79,6 +79,22 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
     free = refine(lines, free, 1e-3)
     poles = np.append(free.poles[first], free.poles[~first])
     return flat, project(flat, poles, free.residues[first], np.ones((first.sum(), 1), complex)), float(min(responses, references) == 1)
+
+
+def _joined(lines: Lines, fit: Fit) -> Fit | None:
+    """Two poles of rank one at one place with one shape as one, and all refined: free residues of overlapping modes are mixed, and one of them was split that is no two. None where two are there still."""
+    for last in (False, True):
+        pairs = np.argwhere(one_shape(lines, fit, same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95)))
+        if not len(pairs):
+            return fit
+        if last:
+            break
+        i, j = pairs[0]
+        u, size, v = np.linalg.svd(np.einsum("ri,rk->ik", fit.shape[[i, j]], fit.participation[[i, j]]))
+        poles, shape, participation = fit.poles.copy(), fit.shape.copy(), fit.participation.copy()
+        poles[i], shape[i], participation[i] = poles[[i, j]].mean(), u[:, 0] * size[0], v[0]
+        fit = refine(lines, project(lines, np.delete(poles, j), np.delete(shape, j, 0), np.delete(participation, j, 0)), 1e-3)
+    return None
 
 
 def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:

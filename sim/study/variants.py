@@ -8,17 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from thermospindle.model.errors import BadInput, instead
+from thermospindle.model.files.formats import SCENE
 from thermospindle.model.machine import Addition, Spindle
-from thermospindle.model.scene.form import Scene, first_error
-from thermospindle.model.scene.reading import build
+from thermospindle.model.scene.fields import read_file
+from thermospindle.model.scene.reading import build, formed
 from thermospindle.sim.effects import checked, resolved
 from thermospindle.sim.effects.effect import Effect, fitted_to, refusal
 from thermospindle.sim.study.form import Study
 
 EFFECTS = "effects"
+NAMED = ("materials", "ball_rows", "roller_rows", "bearings", "sets")  # tables of tables, by names that the scene gives
 Varied = Sequence[tuple[str, tuple[Any, ...]]]
 
 
@@ -50,6 +50,18 @@ def variant(raw: Mapping[str, Any], file: Path, catalogue: Sequence[Effect], cho
     return _with_effects(spindle, of_effects, catalogue)
 
 
+def with_values(spindle: Spindle, catalogue: Sequence[Effect], values: Mapping[str, Any]) -> Spindle:
+    """A spindle that was read from a file, with other values of its keys and of effects' parameters; `BadInput` for what its file could not say."""
+    assert spindle.file is not None
+    raw = read_file(SCENE, spindle.file)
+    for key, value in values.items():
+        try:
+            _check(raw, spindle.file, spindle, catalogue, str(key), [value])
+        except BadInput as error:
+            raise BadInput(f"values[{key!r}]: {error}") from None
+    return variant(raw, spindle.file, catalogue, values)
+
+
 def check(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, catalogue: Sequence[Effect]) -> None:
     """Refuse (`BadInput`) keys that are none of the scene, and values that its form or an effect does not allow, each by itself.
 
@@ -57,14 +69,18 @@ def check(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, ca
     """
     for key, values in study.vary:
         try:
-            parts = key.split(".")
-            if parts[0] == EFFECTS:
-                _check_effect(spindle, parts, values, catalogue)
-                continue
-            for value in values:
-                _check_value(raw, file, key, value)
+            _check(raw, file, spindle, catalogue, key, values)
         except BadInput as error:
             raise BadInput(f"{study.file}: vary.{key!r}: {error}") from None
+
+
+def _check(raw: Mapping[str, Any], file: Path, spindle: Spindle, catalogue: Sequence[Effect], key: str, values: Sequence[Any]) -> None:
+    parts = key.split(".")
+    if parts[0] == EFFECTS:
+        _check_effect(spindle, parts, values, catalogue)
+        return
+    for value in values:
+        _check_value(raw, file, key, value)
 
 
 def _check_effect(spindle: Spindle, parts: list[str], values: Sequence[Any], catalogue: Sequence[Effect]) -> None:
@@ -86,10 +102,7 @@ def _check_value(raw: Mapping[str, Any], file: Path, key: str, value: Any) -> No
     changed = copy.deepcopy(dict(raw))
     parts = key.split(".")
     _table(changed, parts[:-1], key)[parts[-1]] = value
-    try:
-        Scene.model_validate(changed)
-    except ValidationError as error:
-        raise BadInput(first_error(file, changed, Scene, error)) from None
+    formed(changed, file)
 
 
 def _table(raw: dict[str, Any], parts: Sequence[str], key: str) -> dict[str, Any]:
@@ -102,6 +115,8 @@ def _table(raw: dict[str, Any], parts: Sequence[str], key: str) -> dict[str, Any
                 raise BadInput(f"{'.'.join(parts[: depth + 1])} is not in the scene; {instead(part, called)}")
             here = called[part]
         elif isinstance(here, dict):
+            if depth == 1 and parts[0] in NAMED and part not in here:
+                raise BadInput(f"{parts[0]}.{part} is not in the scene; {instead(part, here)}")
             here = here.setdefault(part, {"origin": "assumed"} if depth == 0 else {})  # every number of a scene has an origin
         else:
             raise BadInput(f"{'.'.join(parts[:depth])} is no table of the scene")
