@@ -15,8 +15,11 @@ from thermospindle.diagnosis.inference.resonance import moving, shown
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.nuisance import Resonance
+from thermospindle.model.built.tolerance import LEAST, MOST
+from thermospindle.model.errors import listed
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
+UNBUILT = "the drawing"  # which nothing that is built so explains
 SAME = 3.0  # errors of their difference, within which sizes are the same
 MOVING = "a light resonance"  # whose frequency changes with temperature
 LEFT = "what is left"  # that changes, and tells of something else
@@ -56,12 +59,15 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             beside = f" beside {' and '.join(named_part(free[0]))}" if named_part(free[0]) else ""
             place = f"{' and '.join(forms)} would have to {drift}{beyond}{beside} ({free[0].delta_evidence:.0f} in ln evidence)"
             place += _impossible(found, free[0].names)
+        elif free and free[0].names == (UNBUILT,):
+            off = [f"{name} by {value:+.0%}" for name, value in unbuilt(found.model, found.base)[:NAMED]]
+            place = f"tolerances and measuring errors would, with {listed(off)}, but nothing is built so: the sense of rotation, units, points and the drawing come first"
         elif free and free[0].names != (UNTOLD,):
             sizes = found.base.evidence.learned.sizes
             drifts = [(sizes.get(kinds_of.STIFFNESS_DRIFT, 0.0), NUMERICS[0], "frequency"), (sizes.get(kinds_of.DAMPING_DRIFT, 0.0), NUMERICS[1], "damping")]
             by = " and ".join(f"by {size:.1g} of its {what}" for size, least, what in drifts if size > least)
             place = f"every mode drifts from test to test, {by}, more than two honest programs differ by"
-        if not free or free[0].names == (UNTOLD,):
+        if not free or free[0].names in ((UNTOLD,), (UNBUILT,)):
             return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
         rival = f"; the best of the catalogue, {' + '.join(lead.names)}, gains {lead.delta_evidence:z.0f} in ln evidence" if lead else ""
         no_better = not lead or free[0].delta_evidence >= lead.delta_evidence
@@ -146,6 +152,12 @@ def of_tolerances(model: CampaignModel, best: Hypothesis, explained: bool = True
     if not explained:
         return f" Beside that, tolerances are taken {times:g} times as wide as stated{which}; they may stand in for what is not explained."
     return f" The drawing is off by more than its tolerances, which are taken {times:g} times as wide as stated{which}."
+
+
+def unbuilt(model: CampaignModel, h: Hypothesis) -> list[tuple[str, float]]:
+    """What an explanation has at the least or the most that is taken for possible, a tenth or eleven times of what is drawn: names and relative deviations."""
+    build = [(q.name, q.at(float(m))) for m, q in zip(h.evidence.mean, model.parameters, strict=False) if q.kind == kinds_of.BUILD]
+    return [(name, value) for name, value in build if not LEAST < value < MOST]
 
 
 def of_motions(model: CampaignModel, best: Hypothesis) -> str:

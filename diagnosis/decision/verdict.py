@@ -20,7 +20,7 @@ from thermospindle.diagnosis.decision.explanations import (
     with_unknown,
 )
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
-from thermospindle.diagnosis.decision.reason import LEFT, MOVING, NUMERICS, UNTOLD
+from thermospindle.diagnosis.decision.reason import LEFT, MOVING, NUMERICS, UNBUILT, UNTOLD, unbuilt
 from thermospindle.diagnosis.inference.evidence import left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
@@ -83,7 +83,7 @@ def _unheld(
     found: Search, best: Hypothesis, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
     """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where a light resonance moves with temperature (and what gains little beside it), modes drift by more than two honest
-    programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave much of what changes, or miss it grossly; and drifts that
+    programs differ by, the data are missed grossly, something would have to be built as nothing is, or much is left that is not alike in all tests; effects, where they leave much of what changes, or miss it grossly; and drifts that
     miss the data grossly."""
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
@@ -95,8 +95,9 @@ def _unheld(
         free, none = (*free, moves), 0.0
     by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number
     changes = len(found.model.tests) > 1 and alike.tests < ALIKE and kept[0] > max(MUCH, by_chance)
-    if _adrift(found.base) or gross or changes:
-        name = UNTOLD if gross else LEFT if changes else "every mode"
+    strange = bool(unbuilt(found.model, found.base))
+    if _adrift(found.base) or gross or changes or strange:
+        name = UNTOLD if gross else UNBUILT if strange else LEFT if changes else "every mode"
         free = (*free, Candidate(found.base, (name,), True, 0.0, none))
         none = 0.0
     if kept[1] > MUCH and (kept[1] > (1 - MOSTLY) * kept[0] or kept[1] > GROSS):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.hand_made_search import made, total
-from thermospindle.diagnosis.decision import reason
+from thermospindle.diagnosis.decision import reason, verdict
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.loss import FALSE_ALARM, MISSED, WRONG
 from thermospindle.diagnosis.decision.verdict import decide
@@ -166,6 +166,20 @@ def test_data_that_are_missed_grossly_are_not_nothing_missing(chi2, word):
     assert (v.word, v.probability_none == 0.0) == (word, word == "unexplained")
     assert total(v) == pytest.approx(1.0)
     assert ("units, points" in v.reason) == (word == "unexplained")
+
+
+@pytest.mark.parametrize(("mass", "word"), [(-45.0, "unexplained"), (-10.0, "none")])
+def test_what_nothing_is_built_as_is_not_nothing_missing(mass, word, monkeypatch):
+    """A rotor that turned the other way was *none*: its tolerances had gone to a tenth of the mass and the stiffness of the shaft, with chi2 of 1.01 a number and 39 standard errors left out."""
+    found = made({"a": -3.0, "~x": -4.0})
+    model = SimpleNamespace(parameters=(Nuisance(BUILD, "spindle mass", 0.02), Nuisance(BUILD, "preload", 0.05)))
+    off = reason.unbuilt(model, SimpleNamespace(evidence=SimpleNamespace(mean=np.array([mass, 1.0]))))
+    assert off == ([("spindle mass", -0.9)] if word == "unexplained" else [])
+    for module in (reason, verdict):
+        monkeypatch.setattr(module, "unbuilt", lambda *_: off)
+    v = decide(found)
+    assert (v.word, v.probability_none == 0.0) == (word, word == "unexplained")
+    assert ("with spindle mass by -90%, but nothing is built so: the sense of rotation, units" in v.reason) == (word == "unexplained")
 
 
 @pytest.mark.parametrize(("pair", "word"), [(26.0, "ambiguous"), (34.0, "two effects")])
