@@ -45,7 +45,7 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
         place=place,
         best=best,
         rivals=[(f.law.name, f"{f.criterion - best.criterion:+.1f}") for f in others if f.criterion - best.criterion < NEAR],
-        told=lambda sd, shape: sd < shape[3][1] - shape[3][0],  # a parameter, by its limits
+        told=lambda sd, shape: sd < shape[3][1] - shape[3][0],  # a parameter, by its limits; what is not told stands in the law as a number
         shape=list(zip(best.law.shape, best.values[2:], best.sd[2:], strict=True)),
         formula=f"size * ({best.law.expression}{' + offset' if best.law.has_offset else ''})",
         top=top,

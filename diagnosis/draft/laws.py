@@ -1,6 +1,6 @@
 """The simple laws that physics has over temperature T and speed n, and how each fits what drifts.
 
-None, linear, power, exponential (that grows, or saturates), Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there
+None, linear, linear beyond a temperature, power, exponential (that grows, or saturates), Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there
 everywhere beside it, weighted by the covariance over the tests; the Bayesian information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with
 as many parameters as it has temperatures, speeds, or pairs of these fits whatever changes over them: it is taken where chi2 rules all others out, and the file says that it is not tested.
 """
@@ -61,6 +61,7 @@ def of_temperature(reference: float, hottest: float) -> tuple[Law, ...]:
     exponential, arrhenius = f"exp(({reference - hottest:.6g}) / scale)", f"exp(activation * (1 / {hot} - 1 / {cold}))"
     return (
         Law("linear in temperature", f"({from_reference}) / 40"),
+        Law("linear above a temperature", "max(T - start, 0.0) / 40", (("start", "C", 35.0, (-40.0, 200.0)),)),
         Law("power of temperature", f"max(({from_reference}) / {hottest - reference:.6g}, 0.0) ** power", (POWER,)),
         Law("exponential in temperature", f"(exp(({from_hottest}) / scale) - {exponential}) / (1 - {exponential})", (SCALE,)),
         Law("saturating exponential in temperature", f"(1 - exp(({reference:.6g} - T) / scale)) / (1 - {exponential})", (SCALE,)),
@@ -168,12 +169,12 @@ def _starts(law: Law, temperature: Array) -> list[Array]:
     if not law.shape:
         return [np.zeros(0)]
     start = np.array([s[2] for s in law.shape])
-    names = [s[0] for s in law.shape]
-    if "middle" not in names:
+    places = [i for i, s in enumerate(law.shape) if s[0] in ("middle", "start")]
+    if not places:
         return [start]
-    every = np.unique(temperature)
-    middles = np.clip((every[1:] + every[:-1]) / 2, *law.shape[names.index("middle")][3])
-    return [np.where(np.array(names) == "middle", m, start) for m in middles] or [start]
+    every, place = np.unique(temperature), places[0]
+    middles = np.clip((every[1:] + every[:-1]) / 2, *law.shape[place][3])
+    return [np.where(np.arange(len(start)) == place, m, start) for m in middles] or [start]
 
 
 def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Array, white: Array) -> Array:

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import thermospindle as ts
 from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.cli import main
 from thermospindle.diagnosis.draft.draft import draft
@@ -49,15 +50,27 @@ def drafted(answer, folder):
 
 
 def test_a_shape_that_the_tests_do_not_tell_is_said_to_be_none(tmp_path):
-    """Nothing at 20 and 30 C, much at 50 and more at 60: how steep a sigmoid is between 30 and 50 no test says (it was drafted with +- 32000 K)."""
-    text, own, _ = drafted(of_rings(tmp_path, [0.0, 0.0, 0.0, 4.78, 7.68], 0.4, (20.0, 20.0, 30.0, 50.0, 60.0)), tmp_path)
+    """Nothing up to 30 C, some at 40, all from 50 on: how steep a sigmoid is there no test says (it was drafted with +- 32000 K). It is a number in the law, for as a parameter it would move nothing, and
+    `add` refused the file."""
+    text, own, _ = drafted(of_rings(tmp_path, [0.0, 0.0, 3.0, 7.7, 7.7], 0.4, AT[:5]), tmp_path)
     assert own.title.endswith("sigmoid in temperature")
     assert " K (not told by these tests)." in text
-    assert "shape of the law, not told by these tests" in text
+    assert "  # K, not told by these tests" in text
+    assert [p.name for p in own.parameters] == ["size"]
     assert "+- 3" not in text.split("Rivals")[0]
+    check(own, ts.load("hdd_2003"), (*CATALOGUE, own), own.where)
     sure = draft(of_rings(tmp_path, [0.0, 0.1, 0.5, 1.5, 1.9, 2.0], 0.01, AT), "own").text
     assert "width 4" in sure.split("Rivals")[0]
     assert "not told" not in sure
+
+
+def test_a_gap_that_opens_from_a_temperature_on(tmp_path):
+    """A seat that loosens above 30 C; a sigmoid through it is flat beyond what was seen."""
+    _, own, law = drafted(of_rings(tmp_path, [0.0, 0.02, 2.0, 4.01, 5.98], 0.03, AT[:5]), tmp_path)
+    assert own.title.endswith("linear above a temperature")
+    values = own.typical()
+    assert values["start"] == pytest.approx(30.0, abs=0.5)
+    assert law(80.0, 0.0, values) == pytest.approx(10.0, rel=0.02)
 
 
 def test_what_is_named_needs_no_draft(tmp_path, capsys):
