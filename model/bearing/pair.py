@@ -76,11 +76,16 @@ class PairState:
 
     @property
     def words(self) -> str:
-        """Status and the first ball row's preload, in words."""
-        if not self.bearings:
-            kinds = {"roller bearings" if isinstance(b, RollerState) else "bearings given by numbers" for b in self.linear}
-            return " and ".join(sorted(kinds)) or "no bearings"
-        return f"{self.status}, preload {self.bearings[0].preload:.2f} N"
+        """Status and the first ball row's preload, in words; of other bearings what they are."""
+        return f"{self.status}, preload {self.bearings[0].preload:.2f} N" if self.bearings else self.of_bearings
+
+    @property
+    def of_bearings(self) -> str:
+        """What a title says of the bearings: the status of ball rows, which names those that have lost contact itself; else what bearings there are."""
+        if self.bearings:
+            return f"bearings {self.status}" if self.status == IN_CONTACT else self.status
+        kinds = {"roller bearings" if isinstance(b, RollerState) else "bearings given by numbers" for b in self.linear}
+        return " and ".join(sorted(kinds)) or "no bearings"
 
     @property
     def all_bearings(self) -> tuple[BearingState | LinearState, ...]:

@@ -62,7 +62,7 @@ class HammerTest(Table):
     Without `step_us` the program chooses the integration step (`reading.chosen_step`).
     """
 
-    hammer_nodes: Annotated[list[int], Once] = Field(default_factory=list)
+    hammer_nodes: Annotated[list[int], Once, Field(min_length=1)] | None = None
     tip_stiffness_N_per_m: Positive = 1.0e6
     hammer_mass_g: Positive = 2.0
     level_N: Annotated[float, Field(ge=m.FAINTEST, le=1e6)] = 1.0

@@ -259,7 +259,7 @@ def _show_by_mode(console: Console, c: Comparison) -> None:
             str(number), kind, str(len(modes)), f"{low:.1f}-{high:.1f}", f"{np.mean([o.error for o in modes]):+z.2f}", f"{_rms([o.residual for o in modes]):.1f}",
             f"{m.error:+z.2f}", worst, f"{_rms(damping):.1f}" if damping else _in_percent(modes), f"{min(macs):.3f}" if macs else "",
         ])  # fmt: skip
-    columns = ("mode", "kind", "tests", "measured\nHz", "error, Hz\nmean", "s.e.\nrms", "error, Hz\nworst", "in test", "damping\ns.e. rms", "MAC\nleast")
+    columns = ("mode", "kind", "tests", "measured\nHz", "error, Hz\nmean", "s.e.\nrms", "worst by s.e.\nHz", "in test", "damping\ns.e. rms", "MAC\nleast")
     show_grid(console, f"Modes of {len(c.tests)} tests, computed - measured", columns, rows, ("kind", "in test"), keys=2)
     _show_unsure(console, c)
 

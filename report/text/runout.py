@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import TO_UM, in_rpm
 from thermospindle.report.text.grid import grid, show_grid
-from thermospindle.report.text.states import of_bearings
 from thermospindle.report.typeset import table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.running.lines import FoundLine
@@ -115,11 +115,16 @@ def line_json(line: FoundLine) -> dict[str, Any]:
 # ---------------------------------------------------------------- terminal
 
 
+def _of_contact(answer: dict[str, Any]) -> str:
+    """The status of ball rows; it names those that have lost contact itself."""
+    return "bearings in contact" if answer["status"] == IN_CONTACT else str(answer["status"])
+
+
 def show_runout(console: Console, answer: dict[str, Any], spindle: Spindle) -> None:
     where = looked_at(spindle)
     nominal = f" ({answer['speed_from']})" if answer["speed_from"] != "--speed" else ""
     title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm{nominal}, {answer['revolutions']} revolutions{_of_part(answer, where)}, um"
-    title += f" ({of_bearings(answer['status'])})"
+    title += f" ({_of_contact(answer)})" if spindle.bearings else ""
     quoted = grid(title, ("", f"radial\n({where} x)", f"radial\n({where} y)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():
         quoted.add_row(meaning, *(f"{answer[key][d]:.4f}" if _known(key, spindle) else "-" for d in MAIN))
@@ -219,8 +224,9 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
         for g in answer["lines"][:SHOWN]
     ]  # fmt: skip
     frequency = "its turning frequency; orders are those of the spindle" if _of_part(answer, where) else "the turning frequency"
+    touching = f"{_of_contact(answer)}, " if runout.point.spindle.bearings else ""
     text = (
-        f"<p>{answer['revolutions']} revolutions{escape(_of_part(answer, where))} at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, {of_bearings(answer['status'])}, "
+        f"<p>{answer['revolutions']} revolutions{escape(_of_part(answer, where))} at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, {touching}"
         f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of {frequency}.</p>"
         f"{table(('nm', f'radial ({escape(where)} x)', f'radial ({escape(where)} y)', 'axial'), quoted)}"
         f"{''.join(drawn.values())}"

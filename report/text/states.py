@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.bearing.state import ALIKE
 from thermospindle.model.errors import listed
 from thermospindle.model.files.stiffness_table import BETWEEN, FURTHER, PRESSURE, StiffnessTable
@@ -193,11 +192,6 @@ def _between(table: StiffnessTable, values: Array) -> str:
     return f" ({', '.join(found)})" if found else ""
 
 
-def of_bearings(status: str) -> str:
-    """What a title says of the bearings: their status, which names those that have lost contact itself."""
-    return f"bearings {status}" if status == IN_CONTACT else status
-
-
 def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint, highest: float) -> None:
     """A table of the modes below `highest` (Hz), or in a sentence that there are none, and where the lowest is."""
     if not answer["modes"]:
@@ -205,7 +199,7 @@ def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint, 
         console.print(f"No mode lies below {highest:g} Hz at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm; {lowest}.", highlight=False)
         return
     groups = list(answer["modes"][0]["energy"])
-    title = f"Modes at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm ({of_bearings(answer['status'])})"
+    title = f"Modes at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm ({point.state.of_bearings})"
     columns = ("mode", "f\nHz", "damping\n%", "kind", "whirl", *(f"{g}\n%" for g in groups))
     rows = []
     for i, m in enumerate(answer["modes"], 1):
@@ -242,7 +236,7 @@ def show_static(console: Console, values: dict[str, Any], answers: Sequence[Arou
     points = values["points"]
     rows = _told(values, answers)
     reactions, parts = (list(dict.fromkeys(name for row in points.values() for name in row[key])) for key in ("reactions_N", "compliance_shares"))
-    told = of_bearings(values["bearings"]) + (f", beam {values['beam']}" if values["beam"] != "none" else "")
+    told = f"bearings {values['bearings']}" + (f", beam {values['beam']}" if values["beam"] != "none" else "")
     show_grid(
         console,
         f"Stiffness at each point, and what every bearing bears of 1 N there ({told})",

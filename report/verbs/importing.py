@@ -145,7 +145,8 @@ OUTSIDE = 2.0
 
 def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
     """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz, Hz for rpm; and where nothing does, what the FRFs tell beside the scene's own."""
-    from thermospindle.sim.campaign.likeness import likenesses  # as below
+    from thermospindle.sim.campaign.beside import the_same  # as below
+    from thermospindle.sim.campaign.likeness import likenesses
 
     low, high = spindle.temperatures[0], spindle.temperatures[-1]
     first, last = spindle.hammer.band
@@ -160,7 +161,7 @@ def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
             found.append(f"test {t.id}: lines from {t.frf.frequency[0]:g} to {t.frf.frequency[-1]:g} Hz{elsewhere}")
         if t.modes and not any(first / OUTSIDE <= m.frequency <= OUTSIDE * last for m in t.modes):
             found.append(f"test {t.id}: {len(t.modes)} mode{'s' * (len(t.modes) > 1)} from {t.modes[0].frequency:g} to {t.modes[-1].frequency:g} Hz{elsewhere}")
-    return found or likenesses(spindle, campaign)
+    return [*the_same(campaign), *(found or likenesses(spindle, campaign))]
 
 
 def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None, doubts: list[str]) -> Answer:

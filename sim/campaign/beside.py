@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from thermospindle.model import sense
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, listed
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray
@@ -94,7 +95,7 @@ def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: C
 
 def doubtful(spindle: Spindle, campaign: Campaign) -> list[str]:
     """What is odd about a campaign before it is compared with a scene, a sentence each; what its FRFs tell beside the scene's own is `likeness`."""
-    return [*of_another(spindle, campaign), *sense.of_conditions(spindle, [condition_of(t) for t in campaign.tests]), *left_out(campaign)]
+    return [*of_another(spindle, campaign), *sense.of_conditions(spindle, [condition_of(t) for t in campaign.tests]), *the_same(campaign), *left_out(campaign)]
 
 
 def of_another(spindle: Spindle, campaign: Campaign) -> list[str]:
@@ -104,6 +105,15 @@ def of_another(spindle: Spindle, campaign: Campaign) -> list[str]:
         return []
     where = campaign.folder / "campaign.toml" if campaign.folder else campaign.title
     return [f"{where}: spindle = {campaign.spindle!r}, and the scene is {spindle.name!r}: no point of the campaign tells that they are one machine"]
+
+
+def the_same(campaign: Campaign) -> list[str]:
+    """A sentence for tests whose FRFs are the same to the last bit, as no two measurements are."""
+    alike: dict[bytes, list[str]] = {}
+    for t in campaign.tests:
+        if t.frf is not None and t.frf.value.size and np.ptp(np.abs(t.frf.value)):
+            alike.setdefault(hashlib.sha256(t.frf.value.tobytes()).digest(), []).append(t.id)
+    return [f"tests {listed(ids)} have the same FRFs to the last bit: is one file there under {len(ids)} names?" for ids in alike.values() if len(ids) > 1]
 
 
 def left_out(campaign: Campaign) -> list[str]:

@@ -2,21 +2,21 @@
 
 A model is never right, and none of this is refused. A factor is told where every FRF of a channel has it in the median over the louder half of its lines, the other sign where
 the phases of all are across from the computed ones there; two channels where each fits the other's computed FRFs at least `BETTER` times as well as its own, in rms of ln
-magnitude about the median, which no factor changes; lines in rad/s for Hz where the FRFs of all tests fit the computed ones so much better there. What all tests together do not tell,
-each may by itself: a sensor that was glued on again between two, or one export in another unit.
+magnitude about the median, which no factor changes; lines in rad/s for Hz where the FRFs of all tests fit the computed ones so much better there; and the other sense of rotation where the
+phases of all FRFs that depend on it are those of a spindle that turns so. What all tests together do not tell, each may by itself: a sensor that was glued on again between two, or one export in another unit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange, listed
 from thermospindle.model.machine import Spindle
-from thermospindle.model.types import Array
+from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import beside, check_points
 from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 
@@ -73,6 +73,8 @@ def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
         tests = _tests(spindle, campaign)
         if (axis := _axis(spindle, campaign, tests)) is not None:
             return [axis]
+        if (turned := _turned(spindle, campaign)) is not None:
+            return [turned]
     except (BadInput, NoEquilibrium, OutsideRange) as error:
         return [f"the FRFs are not set beside those of {spindle.name}: {error}"]
     names = {p.node: f"{p.node} ({p.name})" for p in campaign.points}
@@ -108,8 +110,7 @@ def _pairs(spindle: Spindle, campaign: Campaign, test: Test, scale: float) -> li
     size = np.sqrt(np.mean(np.abs(computed) ** 2, axis=-1))
     x, a = (np.log(np.maximum(np.abs(value), 1e-300)) for value in (measured, computed))
     silence = tuple(float(np.log(SILENT) + np.median(value, axis=-1).max()) for value in (x, a))
-    loud = np.abs(computed) >= np.median(np.abs(computed), axis=-1, keepdims=True)
-    cosine = np.mean(np.cos(np.angle(measured * computed.conj())), axis=-1, where=loud)
+    cosine = _cosine(measured, computed, computed)
     turns = [np.cos(np.angle(v * v[..., :1].conj())).min(axis=-1) < ACROSS for v in (measured, computed)]
     cosine = np.where(turns[0] & turns[1], cosine, 0.0)
     ends = [(i, j, r, h) for i, r in enumerate(own.measured.response_nodes) for j, h in enumerate(own.measured.reference_nodes)]
@@ -135,6 +136,44 @@ def _misfit(pairs: Sequence[Pair]) -> float:
     """Rms of ln magnitude between measured and computed, each FRF about its own median; infinite without any, as where the model has no answer."""
     off = [p.heard[0] - p.heard[1] for p in pairs]
     return float(np.sqrt(np.mean(np.concatenate([x - np.median(x) for x in off]) ** 2))) if off else float("inf")
+
+
+# ---------------------------------------------------------------- sense of rotation
+
+
+def _turned(spindle: Spindle, campaign: Campaign) -> str | None:
+    """What is said where, in every test that turns, all FRFs whose phase depends on the sense of rotation, as those from one plane to the other do, are across from the computed ones, and would not be were it the other."""
+    found: list[str] = []
+    for t in campaign.tests:
+        if not t.speed or t.frf is None:
+            continue
+        told, other = (beside(spindle, campaign.points, t, replace(condition_of(t), speed=sign * t.speed)) for sign in (1, -1))
+        if told is None or other is None or not told.held or not len(told.measured.frequency):
+            continue
+        step = -(-len(told.measured.frequency) // MOST_LINES)
+        lines, measured = told.measured.frequency[::step], told.measured.value[..., ::step]
+        own, turned = told.computed(lines), other.computed(lines)
+        size, differ = np.sqrt(np.mean(np.abs(own) ** 2, axis=-1)), _cosine(own, turned, own)
+        loud = size > SILENT * size.max()
+        depends, same = loud & (differ < ACROSS), loud & (differ > -ACROSS)
+        if depends.sum() < 2 or not same.any():
+            continue
+        told_so, if_turned = _cosine(measured, own, own), _cosine(measured, turned, own)
+        if not (np.all(told_so[depends] < ACROSS) and np.all(if_turned[depends] > -ACROSS) and np.median(told_so[same]) > 0):
+            return None
+        found.append(t.id)
+    if not found:
+        return None
+    return (
+        f"test{'s' * (len(found) > 1)} {listed(found)}: FRFs from one plane to the other are those that {spindle.name} has turning the other way: is the sense of rotation another than is told "
+        "(speed_rpm is positive about +z), or does a direction point the other way, as -Y where +Y is?"
+    )
+
+
+def _cosine(a: ComplexArray, b: ComplexArray, computed: ComplexArray) -> Array:
+    """Mean cosine (responses, references) between the phases of FRFs (responses, references, n) over the louder half of the computed lines."""
+    loud = np.abs(computed) >= np.median(np.abs(computed), axis=-1, keepdims=True)
+    return np.asarray(np.mean(np.cos(np.angle(a * b.conj())), axis=-1, where=loud), float)
 
 
 # ---------------------------------------------------------------- factors of units, and signs

@@ -22,8 +22,6 @@ HEAD = """\
 """
 MORE = """\
 # ---------------------------------------------------------------- more, where it is needed
-# quantity = "accelerance"      of the campaign: receptance, mobility or accelerance; FRFs are converted to it (the most frequent by default)
-# band_Hz = [50.0, 3000.0]      lines outside are left out
 # In [[files]]: quantity, unit = "g/N", response = 3, reference = "hub_top0", columns = { "Ch 2" = "response 3 [m/s^2]" }, phase_unit = "deg",
 #   start_Hz, step_Hz, sample_rate_Hz, damping_unit, conjugate = true, leave_out = ["set 5", "H(3,1)"], test = "T20" (files of one test share it)
 # In [[tests]]: hammer_level_N, soak_time_min, window_decay_1_per_s, pretrigger_s, averages, repeat, conditions = { humidity = 0.4 }
@@ -32,6 +30,10 @@ MORE = """\
 """
 
 
+OF_FRFS = """\
+# quantity = "accelerance"    # of the campaign: receptance, mobility or accelerance; FRFs are converted to it (the most frequent by default)
+# band_Hz = [50.0, 3000.0]    # lines outside are left out"""
+"""Keys of the whole file: below the first table they would be one of its."""
 OF_RECORDS = ("hit_length_s",)
 """Keys under [records] that may be asked."""
 
@@ -46,6 +48,8 @@ def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
         lines.append("# damping_sd_percent = 10.0    # how sure their dampings are: one standard deviation in per cent of each; without, they are shown and judge nothing")
     if any(m.shape for every in found.modes.values() for m in every):
         lines.append("# shape_sd_percent = 5.0    # how sure their shapes are: one standard deviation in per cent of the largest of each; without, they are left out")
+    if found.curves or not found.modes:
+        lines.append(OF_FRFS)
     common, own = _shared(found.questions, files)
     for suffix, questions in common.items():
         many = sum(f.suffix == suffix for f in files)

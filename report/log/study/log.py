@@ -46,8 +46,9 @@ def write_study_log(spindles: Sequence[Spindle], told: Mapping[str, Any], table:
 
 def _log_series(recording: rr.RecordingStream, series: Mapping[str, Mapping[str, tuple[Array, Array]]]) -> None:
     for name, by_condition in series.items():
-        for k, (condition, (case, values)) in enumerate(by_condition.items()):
-            look = curve_look(light(colour(k, range(max(2, len(by_condition))))), condition, 1.5)
+        every = max(([*own] for own in series.values() if by_condition.keys() <= own.keys()), key=len)  # a mode that some conditions alone have is coloured as there
+        for condition, (case, values) in by_condition.items():
+            look = curve_look(light(colour(every.index(condition), range(max(2, len(every))))), condition, 1.5)
             log_curve(recording, at("series", name, condition), rr.TimeColumn(CASE, sequence=case), values, look)
 
 

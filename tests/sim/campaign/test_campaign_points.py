@@ -50,6 +50,15 @@ def test_temperatures_that_no_spindle_bears_are_said_of_a_campaign(spindle):
     assert said.startswith("600 C lies outside -40 to 120 C")
 
 
+def test_one_file_under_two_names_is_said(spindle):
+    """As two temperatures it was taken in silence."""
+    own = written(spindle)
+    assert own.tests[0].frf is not None
+    frf = replace(own.tests[0].frf, value=own.tests[0].frf.value * np.random.default_rng(0).normal(1.0, 0.1, own.tests[0].frf.value.shape))
+    twice = (replace(own.tests[0], frf=frf), replace(own.tests[0], frf=frf, id="T40", temperature=40.0))
+    assert doubtful(spindle, replace(own, tests=twice)) == [f"tests {own.tests[0].id} and T40 have the same FRFs to the last bit: is one file there under 2 names?"]
+
+
 def written(spindle):
     """A campaign of two lines at rest, its points those of a spindle's scene as its files have them."""
     nodes = tuple(p.node for p in spindle.points)

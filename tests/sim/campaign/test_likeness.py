@@ -124,6 +124,16 @@ def test_a_hammer_that_is_reversed_is_said(spindle, foreign):
     assert said.startswith("all FRFs have the other sign")
 
 
+def test_the_other_sense_of_rotation_is_said(spindle, foreign):
+    """It was told as a spindle whose shaft had a tenth of its mass, and nothing missing."""
+    turning = [t.id for t in foreign.tests if t.speed]
+    assert len(turning) > 1
+    [said] = likenesses(spindle, replace(foreign, tests=tuple(replace(t, speed=-t.speed) for t in foreign.tests)))
+    assert said.startswith(f"tests {', '.join(turning[:-1])} and {turning[-1]}: FRFs from one plane to the other are those that hdd_2003 has turning the other way")
+    one = [replace(t, speed=-t.speed) if t.id == turning[0] else t for t in foreign.tests]
+    assert not [s for s in likenesses(spindle, replace(foreign, tests=tuple(one))) if "turning the other way" in s]  # in all, or in none: the others tell that it is told right
+
+
 def test_lines_between_a_resonance_and_its_drawn_place_tell_no_sign(spindle, foreign):
     """All of them are across there."""
     frf = foreign.tests[0].frf
