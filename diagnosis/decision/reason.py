@@ -20,6 +20,7 @@ from thermospindle.model.errors import listed
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 UNBUILT = "the drawing"  # which nothing that is built so explains
+HARDLY = 0.8  # of what is left of conditions left out, from which that is no less
 SAME = 3.0  # errors of their difference, within which sizes are the same
 MOVING = "a light resonance"  # whose frequency changes with temperature
 LEFT = "what is left"  # that changes, and tells of something else
@@ -76,7 +77,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     named = " + ".join(effects)
     checked = ""
     if np.isfinite(after):
-        how = "" if after < before else ", for it is less sure of them"
+        how = "" if after < HARDLY * before else ", which hardly speaks for it" if after < before else ", for it is less sure of them"
         checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors, {gain:+z.0f} in ln probability density{how}"
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]
