@@ -47,14 +47,16 @@ def test_what_says_nothing_is_left_out(shaft):
 
 def test_the_error_falls_on_modes_left_out(shaft):
     """Euler-Bernoulli, rotary inertia, shear, accelerometer mass: the error of all data and that of each mode predicted from the other three. It was "-" for every fit,
-    and the error went 0.06, 0.51, 0.27 on top of a constant error of every frequency."""
+    and the error went 0.06, 0.51, 0.27 on top of a constant error of every frequency. What is below the measurement's own errors, per cent tell nothing of: a mass of the sensor that is not established
+    takes 0.019 % to 0.023 %, or leaves it, as the machine rounds the tie of two prior widths."""
     names = [TOLERANCES, *(f"+ {name}" for name in BEAM)]
     climbed = [shaft.step(name) for name in names]
     assert [r.above for r in climbed[1:]] == names[:-1]
+    measured = 100 * float(np.sqrt(np.mean([(m.frequency_sd / m.frequency) ** 2 for t in shaft.campaign.tests for m in t.modes])))
     for below, r in pairwise(climbed):
         assert r.error < 1.02 * below.error
         assert r.held_out < 1.02 * below.held_out
-        assert r.held_out_percent < 1.02 * below.held_out_percent
+        assert r.held_out_percent < max(1.02 * below.held_out_percent, measured)
     bare, _, sheared, _ = climbed
     assert bare.held_out_percent > 1.0
     assert sheared.held_out_percent < 0.1

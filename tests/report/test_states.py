@@ -2,21 +2,34 @@
 
 import io
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from tests.conftest import ROOT
 from thermospindle.cli import main
-from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.files.stiffness_table import StiffnessTable
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM, in_rpm
-from thermospindle.report.text.states import of_bearings, show_modes, show_told_table
+from thermospindle.report.text.states import show_modes, show_told_table
+from thermospindle.sim.operating import operating_point
 
 
-@pytest.mark.parametrize(("status", "told"), [(IN_CONTACT, "bearings in contact"), ("lower and upper bearing lost contact", "lower and upper bearing lost contact")])
-def test_a_title_names_bearings_once(status, told):
-    assert of_bearings(status) == told
+@pytest.mark.parametrize(
+    ("scene", "temperature", "told"),
+    [
+        ("hdd_2003", 20.0, "bearings in contact"),
+        ("hdd_2003", 293.0, "lower and upper bearing lost contact"),
+        ("mk7702", 20.0, "bearings given by numbers"),
+        ("free_shaft", 20.0, "no bearings"),
+    ],
+)
+def test_a_title_names_bearings_once(scene, temperature, told):
+    """A shaft that hangs free was said to have bearings in contact."""
+    assert operating_point(load(ROOT / "scenes" / scene), Condition(temperature)).state.of_bearings == told
 
 
 def said_of(values: list[list[float]], speeds: tuple[float, ...] = (0.0,)) -> str:
@@ -39,7 +52,7 @@ def test_an_undamped_mode_has_no_damping_less_than_nothing():
     """Rounding made -0.000 % of it."""
     mode = {"frequency_Hz": 286.23, "damping_ratio": -1e-16, "kind": "lateral", "whirl": "none", "energy": {"bar": 1.0}}
     console = Console(record=True, width=100, file=io.StringIO())
-    show_modes(console, {"temperature_C": 20.0, "speed_rpm": 0.0, "status": IN_CONTACT, "modes": [mode]}, None, 5000.0)
+    show_modes(console, {"temperature_C": 20.0, "speed_rpm": 0.0, "modes": [mode]}, SimpleNamespace(state=SimpleNamespace(of_bearings="no bearings")), 5000.0)
     said = console.export_text()
     assert "0.000" in said
     assert "-0.000" not in said
