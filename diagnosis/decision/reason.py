@@ -77,7 +77,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     named = " + ".join(effects)
     checked = ""
     if np.isfinite(after):
-        how = "" if after < HARDLY * before else ", which hardly speaks for it" if after < before else ", for it is less sure of them"
+        how = "" if after < HARDLY * before else ", but missed nearly as far: its law is hardly theirs" if after < before else ", for it is less sure of them"
         checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors, {gain:+z.0f} in ln probability density{how}"
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]

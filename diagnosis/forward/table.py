@@ -10,7 +10,7 @@ from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward.linear import Linear, Products, shown
 from thermospindle.diagnosis.forward.shapes import ShapeBeside
 from thermospindle.model.errors import listed
-from thermospindle.model.rotor.modes import Poles, kinds, oscillating, poles_below, stiffest_of, with_mass_between
+from thermospindle.model.rotor.modes import Poles, kinds, oscillating, poles_below, stiffest_of, vectors_below, with_mass_between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import MIXING, ModeSet
@@ -41,12 +41,7 @@ class Table:
     def residual(self) -> Array:
         """Frequencies and the dampings and shapes that are known, computed less measured in standard errors (N,)."""
         data = self._data
-        if data.shapes:
-            pole = self._poles.value[self._own]
-        else:
-            every, shape = poles_below(self._linear.matrices, self._reach, self._linear.between)
-            pole = every[self._partners(every, shape)]
-        pole = pole - self._linear.chain.decay
+        pole = self._vectors[0] - self._linear.chain.decay
         frequency, damping = np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)
         known = np.isfinite(data.damping_sd)
         by_frequency = np.log(frequency / data.frequency) / data.frequency_sd
@@ -56,8 +51,8 @@ class Table:
     def moved(self, by: Products) -> Array:
         """Derivatives (k, N) of the residual by the parameters that change M, C and K as `by` says: first-order perturbation of the poles,
         -left (p^2 dM + p dC + dK) right (Lancaster 1964, AIAA J. 2, 1659)."""
-        data, own = self._data, self._own
-        pole, right, left = self._poles.value[own], self._poles.right[:, own], self._poles.left[own]
+        data = self._data
+        pole, right, left = self._vectors
         moved = np.zeros((len(pole), by.count), complex)
         if len(by.of):
             moved[:, by.of] = -np.add.reduceat(pole[:, None] ** by.power * (left @ by.left) * (right.T @ by.right), by.first, axis=1)
@@ -115,6 +110,16 @@ class Table:
     @cached_property
     def _found(self) -> Integers:
         return np.array(oscillating(self._poles, self._reach, stiffest_of(self._linear.matrices)))
+
+    @cached_property
+    def _vectors(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Poles (m,) of the table's modes with right (n, m) and left vectors (m, n); of a flexible shaft without shapes by its reduced model."""
+        if self._data.shapes:
+            own = self._own
+            return self._poles.value[own], self._poles.right[:, own], self._poles.left[own]
+        value, right, left = vectors_below(self._linear.matrices, self._reach, self._linear.between)
+        own = self._partners(value, right)
+        return value[own], right[:, own], left[own]
 
     @cached_property
     def _own(self) -> Integers:

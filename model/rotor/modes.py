@@ -235,12 +235,22 @@ def with_mass_between(linear: Matrices, between: Between | None) -> Poles:
 def poles_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray]:
     """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m); of a flexible shaft by
     its reduced model, where `highest` is finite, and with its mass where it is and not at nodes, where that is told."""
+    value, right, _ = _below(linear, highest, between, False)
+    return value, right
+
+
+def vectors_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """The same, with their left vectors (m, n), scaled as those of `Poles`."""
+    return _below(linear, highest, between, True)
+
+
+def _below(linear: Matrices, highest: float, between: Between | None, lefts: bool) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     n = len(linear.mass)
     if n <= LARGE or not np.isfinite(highest):
         p = with_mass_between(linear, between)
         found = oscillating(p, highest, stiffest_of(linear))
-        return p.value[found], p.right[:, found]
-    values, columns, stiffest = [], [], 0.0
+        return p.value[found], p.right[:, found], p.left[found] if lefts else np.zeros((0, n), complex)
+    values, columns, rows, stiffest = [], [], [], 0.0
     for own in _apart(linear):  # each by itself, so that equal modes of two planes stay in their planes
         grid = np.ix_(own, own)
         part = Matrices(linear.mass[grid], linear.damping[grid], linear.stiffness[grid], ())
@@ -248,14 +258,17 @@ def poles_below(linear: Matrices, highest: float, between: Between | None = None
         q = small.basis
         added = None if between is None else (q.T @ between[0][grid] @ q, q.T @ between[1][grid] @ q, q.T @ between[2][grid] @ q)
         p = with_mass_between(Matrices(small.mass, small.damping, small.stiffness, ()), added)
-        right = np.zeros((n, len(p.value)), complex)
+        right, left = np.zeros((n, len(p.value)), complex), np.zeros((len(p.value) if lefts else 0, n), complex)
         right[own] = q @ p.right
+        if lefts:
+            left[:, own] = p.left @ q.T
         values.append(p.value)
         columns.append(right)
+        rows.append(left)
         stiffest = max(stiffest, small.stiffest)
     whole = Poles(np.concatenate(values), np.concatenate(columns, axis=1), ())
     found = oscillating(whole, highest, stiffest)
-    return whole.value[found], whole.right[:, found]
+    return whole.value[found], whole.right[:, found], np.concatenate(rows)[found] if lefts else np.zeros((0, n), complex)
 
 
 def oscillating(p: Poles, highest: float = np.inf, stiffest: float = 0.0) -> list[int]:
