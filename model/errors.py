@@ -43,6 +43,7 @@ def instead(word: str, known: Iterable[str]) -> str:
     """What to say after an unknown `word`: the known one it is most like, or all that are known."""
     names = list(known)
     part = [name for name in names if word and (name.startswith(word) or word.startswith(name))]
+    part += [name for name in names if word and all(any(own.startswith(w) for own in name.split()) for w in word.split())]
     near = [*part, *get_close_matches(word, names, n=1)]
     return f"did you mean {near[0]}?" if near else f"allowed are {', '.join(names) or 'none'}"
 

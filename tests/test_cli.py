@@ -11,6 +11,7 @@ from tests.command_line import answer, refused
 from tests.conftest import SCENE
 from tests.test_site import ANSWERS
 from thermospindle.cli import main
+from thermospindle.model.errors import instead
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
@@ -237,3 +238,17 @@ def test_people_see_a_comparison(capsys, short_scene, simulated):
     assert "CSAC" in text
     assert "1002.00" in text
     assert "…" not in text
+
+
+@pytest.mark.parametrize("verb", ["impact", "runout"])
+def test_balls_by_themselves_are_refused_where_none_are(verb, capsys):
+    """Bearings given by numbers were stepped as linear ones without a word."""
+    assert main([verb, "mk7702", "--element", "ball-by-ball"]) == 2
+    assert capsys.readouterr().err.strip() == "spindle: --element ball-by-ball: no bearing of mk7702 has balls; allowed is linear"
+
+
+def test_the_name_that_is_meant_has_all_words_that_were_said():
+    names = ["shaft", "rear housing", "rear inner rings", "front inner rings"]
+    assert instead("rear ring", names) == "did you mean rear inner rings?"
+    assert instead("rear hous", names) == "did you mean rear housing?"
+    assert instead("x", names).startswith("allowed are shaft, rear housing")

@@ -1,7 +1,7 @@
 """The bearing elements of the time simulation, and what else a hammer test can be computed with."""
 
-LINEAR = "linear"
-ELEMENTS = (LINEAR, "ball-by-ball")
+LINEAR, BALLS = "linear", "ball-by-ball"
+ELEMENTS = (LINEAR, BALLS)
 """The tangent stiffness at the operating point, or every ball by itself."""
 
 REDUCED = "reduced"

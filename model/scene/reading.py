@@ -26,7 +26,7 @@ from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.built.drawn import GRADES, drawn
 from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.carrier import check_carriers
-from thermospindle.model.errors import BadInput, NoEquilibrium
+from thermospindle.model.errors import BadInput, NoEquilibrium, instead
 from thermospindle.model.files.formats import KEY, SCENE, migrated
 from thermospindle.model.machine import Bearing, Condition, Provenance, Spindle
 from thermospindle.model.rotor.beam import with_shafts
@@ -115,10 +115,24 @@ def shipped_rows() -> dict[str, dict[str, Any]]:
 def formed(raw: Mapping[str, Any], file: Path) -> tuple[dict[str, Any], scene_file.Scene]:
     """Parsed TOML in today's format, with the shipped rows that it names, and as the form of a scene; `BadInput` where it does not fit that."""
     whole = with_shipped_rows(migrated(SCENE, dict(raw), file))
+    _check_rows(whole, file)
     try:
         return whole, scene_file.Scene.model_validate(whole)
     except ValidationError as error:
         raise BadInput(scene_file.first_error(file, whole, scene_file.Scene, error)) from None
+
+
+def _check_rows(whole: Mapping[str, Any], file: Path) -> None:
+    """`BadInput` for a bearing of a row that is neither the scene's own nor shipped; what is wrong otherwise the form says."""
+    own, bearings = [whole.get(kind, {}) for kind in ROW_KINDS], whole.get("bearings", {})
+    if not all(isinstance(table, Mapping) for table in (*own, bearings)):
+        return
+    there = [name for rows in own for name in rows]
+    shipped_ones = [name for rows in shipped_rows().values() for name in rows if name not in there]
+    for name, b in bearings.items():
+        row = b.get("row") if isinstance(b, Mapping) else None
+        if isinstance(row, str) and row not in there:
+            raise BadInput(f"{file}: bearings.{name}.row = {row!r}: no row of this scene, nor a shipped one; {instead(row, [*there, *shipped_ones])}")
 
 
 def with_shipped_rows(raw: Mapping[str, Any]) -> dict[str, Any]:

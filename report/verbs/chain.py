@@ -20,6 +20,7 @@ from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
+    check_element,
     check_out,
     temperature_or_reference,
     temperatures_or_range,
@@ -116,6 +117,7 @@ def simulate(
         if value <= 0:
             raise BadInput(f"{option} {value:g}: must be positive")
     spindle = with_hammer(with_effects(scene, effect_files)[0], hits, level)
+    check_element(spindle, element)
     steps, nominal = temperatures_or_range(temperatures, spindle), spindle.nominal_speed / RPM
     if runout:
         speeds = speeds_rpm or ([speed_rpm] if speed_rpm else [nominal / 2, 0.75 * nominal, nominal])
@@ -171,6 +173,7 @@ def _virtual_tests(spindle: Spindle, temperatures: Sequence[float], speed_rpm: f
 
 
 def _hint(spindle: Spindle, temperatures: Sequence[float], element: str | None) -> None:
+    check_element(spindle, element)
     if words := takes_long(spindle, element, len(temperatures)):
         hint(words)
 

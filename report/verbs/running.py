@@ -20,6 +20,7 @@ from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_j
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
+    check_element,
     check_out,
     temperature_or_reference,
     temperatures_or_range,
@@ -57,6 +58,7 @@ def runout(
         spindle = with_imperfections(spindle, drawn(spindle, seed))
     speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
     _ = spindle.turning  # refused where nothing turns
+    check_element(spindle, element)
     point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed))
     plan = planned(point, seconds, element, path)
     with progress_bar(plan.pieces + 5) as progress:

@@ -269,7 +269,7 @@ REFUSED = [
     (lambda r: r["bearings"]["upper"].pop("inner_ring"), "inner_ring and outer_ring go together"),
     (lambda r: r["bearings"]["upper"].update(outer_ring="nose"), "outside its ring 'nose'"),
     (lambda r: r["roller_rows"].update(hdd=r["roller_rows"]["above"]), "roller_rows.hdd: a ball row has that name"),
-    (lambda r: r["bearings"]["upper"].update(row="N9"), "bearings.upper.row = 'N9': allowed are hdd, above"),
+    (lambda r: r["bearings"]["upper"].update(row="N9"), "bearings.upper.row = 'N9': no row of this scene, nor a shipped one; allowed are hdd, above, B7015C"),
 ]
 
 
