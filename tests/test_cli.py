@@ -2,13 +2,15 @@
 
 import json
 import re
+import subprocess
+import sys
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from tests.command_line import answer, refused
-from tests.conftest import SCENE
+from tests.conftest import DATA, SCENE
 from tests.test_site import ANSWERS
 from thermospindle.cli import main
 from thermospindle.model.errors import instead
@@ -252,3 +254,17 @@ def test_the_name_that_is_meant_has_all_words_that_were_said():
     assert instead("rear ring", names) == "did you mean rear inner rings?"
     assert instead("rear hous", names) == "did you mean rear housing?"
     assert instead("x", names).startswith("allowed are shaft, rear housing")
+
+
+@pytest.mark.slow
+def test_what_is_asked_to_end_stops_as_by_a_key():
+    """`timeout` ends a process by SIGTERM: workers were left to the system, and Python told of semaphores."""
+    command = [sys.executable, "-m", "thermospindle", "diagnose", "hdd_2003", str(DATA / "foreign_bond"), "--json"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    assert "steps done" in process.stderr.readline()
+    process.terminate()
+    out, said = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert said.splitlines()[-1] == "spindle: stopped; nothing was left half written"
+    assert "semlock" not in said
