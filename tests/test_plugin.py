@@ -7,6 +7,7 @@ import sys
 import warnings
 from importlib.metadata import entry_points
 
+import numpy as np
 import pytest
 
 import thermospindle.front  # noqa: F401 - before pytest's own tool runs tests in this process, and takes away what they import
@@ -167,7 +168,7 @@ def test_a_line_that_crosses_between_two_temperatures_is_near():
         assert_margin(SCENE, **told)
     assert "between 20 and 60 C: 30 fc (inner waviness of order 29 of bearing lower, forward) crosses it, from -5.92 to +2.73 %" in str(error.value)
     for t in (20, 60):
-        assert_margin(SCENE, **told, temperatures_C=[t])
+        assert_margin(SCENE, **told, temperatures_C=np.array([t]))
     with pytest.raises(AssertionError, match=r"50 C: 30 fc .* -0.01 % from"):
         assert_margin(SCENE, **told, temperatures_C=[50])
 

@@ -59,7 +59,7 @@ def load(scene: str | Path, effect_files: Sequence[str | Path] = (), *, values: 
     """The spindle of a scene: its folder, its `spindle.toml`, or the name of a shipped one like "hdd_2003".
 
     `effect_files` hold effects of your own that the scene has. `values` stand in for those of the file, in its units, by dotted key with entries of lists by their name:
-    {"sets.main.preload_N": 200, "effects.bond_softening.compliance_hot": 10}, as in `[vary]` of a study.
+    {"sets.main.preload_N": 200, "effects.bond_softening.hot_compliance": 10}, as in `[vary]` of a study.
     """
     of_kind("scene", scene, (str, Path), "a scene's folder or the name of a shipped one")
     files = [Path(f) for f in _several("effect_files", effect_files, "paths of files")]

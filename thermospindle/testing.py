@@ -13,7 +13,7 @@ spindle (`thermospindle.load`). A scene and a condition are computed once a proc
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from numbers import Integral
 from pathlib import Path
@@ -158,8 +158,8 @@ def assert_margin(
     if not isinstance(multiples, Integral) or multiples < 1:
         raise BadInput(f"multiples = {multiples!r}: of the number of balls, up to which waviness counts; must be a whole number of 1 or more")
     spindle = _loaded(scene)
-    at = spindle.temperatures if temperatures_C is None else temperatures_C
-    if not isinstance(at, Sequence) or isinstance(at, str) or not at:
+    at = list(spindle.temperatures if temperatures_C is None else temperatures_C) if isinstance(temperatures_C, Iterable | None) else []
+    if not at or isinstance(temperatures_C, str):
         raise BadInput(f"temperatures_C = {temperatures_C!r}: must be a list of temperatures in C, one at least")
     points = [_point(spindle, t, speed_rpm) for t in at]
     index = _index(points[0], mode)
