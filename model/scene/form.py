@@ -131,8 +131,6 @@ class Scene(Table):
         if both:
             raise ValueError(f"roller_rows.{min(both)}: a ball row has that name; names of rows must differ")
         for name, bearing in self.bearings.items():
-            if bearing.row is not None and bearing.row not in (*self.ball_rows, *self.roller_rows):
-                raise ValueError(f"bearings.{name}.row = {bearing.row!r}: allowed are {', '.join((*self.ball_rows, *self.roller_rows)) or 'rows of its own'}")
             if bearing.row is not None:
                 try:
                     bearing.check_row(bearing.row in self.ball_rows)
