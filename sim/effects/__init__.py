@@ -65,6 +65,7 @@ from thermospindle.sim.effects.temperature import (
     expansion_mismatch,
     fixture_lag,
     loose_inserts,
+    seat_friction,
     soak_lag,
     thermal_gradient,
 )
@@ -77,6 +78,7 @@ CATALOGUE: tuple[Effect, ...] = (
     expansion_mismatch.EFFECT,
     loose_inserts.EFFECT,
     cooling_imbalance.EFFECT,
+    seat_friction.EFFECT,
     # bearings
     preload_loss.EFFECT,
     constant_force_preload.EFFECT,

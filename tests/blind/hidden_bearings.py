@@ -70,7 +70,7 @@ def of_bearings(spindle: Spindle) -> list[Mechanism]:
                   {"bearings": _in_series(None)}, sign=1, laws="any"),
         Mechanism(f"compliance in series with the {last} bearing", "% of the bearing's", 0.5, 25.0, ("bond_softening", "seat_clearance"), last,
                   {"bearings": _in_series(last)}, sign=1),
-        Mechanism("bearing damping", "% (ln)", 10.0, 150.0, ("grease_damping", "lubricant_film"), "bearings damping",
+        Mechanism("bearing damping", "% (ln)", 10.0, 150.0, ("grease_damping", "lubricant_film", "seat_friction"), "bearings damping",
                   {"bearings": _each(None, lambda b, a: replace(b, damping=np.exp(a / 100) * b.damping))}),
         Mechanism("negative stiffness between rotor and stator", "% of a bearing's radial", 0.1, 3.0, ("magnetic_pull",), "bearings",
                   {"chain": _pull}, sign=1, laws="any"),

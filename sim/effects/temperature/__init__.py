@@ -11,5 +11,7 @@ fixture_lag         the other way round: the standing part, bolted to a fixture 
 thermal_gradient    the running bearings heat themselves: their friction leaves shaft and inner rings hotter than the
                     hub
 cooling_imbalance   a cooled housing round a warm shaft
+seat_friction       the rings' seats lose interference as they grow, and rub more: the bearings' damping rises with
+                    temperature
 ==================  ====================================================================================================
 """

@@ -24,7 +24,7 @@ from thermospindle.sim.effects.bearing import (
     preload_loss,
     ring_growth,
 )
-from thermospindle.sim.effects.temperature import expansion_mismatch, fixture_lag, loose_inserts, soak_lag, thermal_gradient
+from thermospindle.sim.effects.temperature import expansion_mismatch, fixture_lag, loose_inserts, seat_friction, soak_lag, thermal_gradient
 from thermospindle.sim.operating import operating_point
 from thermospindle.thermal.expansion import expand
 
@@ -37,6 +37,7 @@ MODULES = (
     constant_force_preload,
     expansion_mismatch,
     fixture_lag,
+    seat_friction,
     grease_damping,
     hertz_amplitude,
     loose_inserts,

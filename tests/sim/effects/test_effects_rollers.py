@@ -14,7 +14,7 @@ from thermospindle.model.units import RPM
 from thermospindle.sim.effects.bearing import grease_damping, preload_loss, ring_growth
 from thermospindle.sim.effects.effect import refusal
 from thermospindle.sim.effects.structure import modulus_softening, shaft_bending
-from thermospindle.sim.effects.temperature import cooling_imbalance, fixture_lag, soak_lag, thermal_gradient
+from thermospindle.sim.effects.temperature import cooling_imbalance, fixture_lag, seat_friction, soak_lag, thermal_gradient
 from thermospindle.sim.operating import operating_point
 
 
@@ -47,6 +47,15 @@ def test_a_ring_that_grows_by_its_rotation_takes_clearance_of_rollers(tail):
     assert growth == pytest.approx(0.186e-6, rel=0.02)
     plain, grown = front(own, 20.0, 4000.0), front(own, 20.0, 4000.0, (ring_growth.EFFECT, {"scale": 1.0}))
     assert plain.clearance - grown.clearance == pytest.approx(2 * growth, rel=1e-6)
+
+
+def test_seats_that_rub_damp_rollers_as_they_do_balls(tail):
+    """A third of the pressure at 60 C triples what seats lose."""
+    values = seat_friction.EFFECT.neutral() | {"rubbing_share": 0.25}
+    plain, loose = (operating_point(tail, Condition(60.0), effects).state for effects in ([], [(seat_friction.EFFECT, values)]))
+    for old, new in ((plain.rollers["front1"], loose.rollers["front1"]), (plain.bearings[0], loose.bearings[0])):
+        assert new.damping == pytest.approx((0.75 + 0.25 * 3) * old.damping)
+        assert np.array_equal(new.stiffness, old.stiffness)
 
 
 def test_grease_damps_rollers_as_it_does_balls(tail):

@@ -12,7 +12,7 @@ from thermospindle.model.material import Law
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.bearing import preload_loss
-from thermospindle.sim.effects.temperature import expansion_mismatch, fixture_lag, loose_inserts, soak_lag, thermal_gradient
+from thermospindle.sim.effects.temperature import expansion_mismatch, fixture_lag, loose_inserts, seat_friction, soak_lag, thermal_gradient
 from thermospindle.sim.operating import operating_point
 from thermospindle.thermal import conduction, friction, heat
 from thermospindle.thermal.expansion import expand
@@ -128,6 +128,16 @@ def test_fixture_lag_scales_the_standing_part(spindle, soak, share):
         assert motions[name].outer_r == pytest.approx(whole.outer_r, rel=1e-12)
         assert motions[name].ball_strain == pytest.approx((1 - share / 2) * whole.ball_strain, rel=1e-9)
         assert motions[name].temperature == pytest.approx(60 - share * 20)
+
+
+@pytest.mark.parametrize(("temperature", "pressure"), [(20.0, 1.0), (50.0, 0.5), (60.0, 1 / 3), (0.0, 4 / 3), (90.0, 0.1)])
+def test_seats_lose_in_inverse_proportion_to_their_pressure(spindle, temperature, pressure):
+    """A fit that 60 K would open; above that a tenth of its pressure stays."""
+    values = {"rubbing_share": 0.4, "span": 60.0}
+    point, plain = (operating_point(spindle, Condition(temperature), effects) for effects in ([(seat_friction.EFFECT, values)], []))
+    for b, old in zip(point.state.bearings, plain.state.bearings, strict=True):
+        assert b.damping == pytest.approx((0.6 + 0.4 / pressure) * old.damping, rel=1e-12)
+        assert np.array_equal(b.stiffness, old.stiffness)
 
 
 # ------------------------------------------------------------------ expansion
