@@ -58,6 +58,13 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     )
     shown = ", ".join(f"{f:.0f}" for f in modes[:8]) + (" ..." if len(modes) > 8 else "")
     found.append(f"At {values['reference_temperature_C']:g} C at rest {len(modes)} modes up to {h['band_Hz'][1]:g} Hz" + (f": {shown} Hz." if modes else "."))
+    if hidden := values["modes_unseen"]:
+        each = [f"{m['kind']} {m['frequency_Hz']:.0f}" for m in hidden]
+        found.append(
+            f"No FRF of the hammer test shows one of them, {listed(each)} Hz: it moves no point along its direction, or no hammer drives it."
+            if len(each) == 1
+            else f"No FRF of the hammer test shows {len(each)} of them, {listed(each)} Hz: they move no point along its direction, or no hammer drives them."
+        )
     found.append(f"Meant for {low:g} to {high:g} C" + (f" and {values['nominal_speed_rpm']:g} rpm." if turning else "."))
     effects = values["effects"]
     count = len(effects["can_act"]) + len(effects["nothing_to_act_on"])

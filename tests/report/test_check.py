@@ -281,3 +281,16 @@ def test_a_rotor_that_stiffens_nothing_is_in_the_legend_and_under_no_name(tmp_pa
     entry = "mass that stiffens nothing"
     assert entry in {t.get_text() for t in figure.legends[0].get_texts()}
     assert entry not in {t.get_text() for t in drawing(operating_point(load(SCENES["rotor"]), Condition(20.0))).legends[0].get_texts()}
+
+
+def test_modes_that_no_frf_shows_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Hammers across the axis excite nothing along it; one along it does, on the same spindle."""
+    found = checked(SCENES["five_bearing"], capsys)
+    assert [(m["kind"], round(m["frequency_Hz"])) for m in found["modes_unseen"]] == [("axial", 576), ("axial", 1131)]
+    assert main(["check", str(SCENES["five_bearing"])]) == 0
+    assert "No FRF of the hammer test shows 2 of them, axial 576 and axial 1131 Hz" in " ".join(capsys.readouterr().out.split())
+    text = SCENES["five_bearing"].read_text(encoding="utf-8")
+    assert text.count("hammer_nodes = [1, 2]") == 1
+    (tmp_path / "spindle.toml").write_text(text.replace("hammer_nodes = [1, 2]", "hammer_nodes = [1, 2, 3]"), encoding="utf-8")
+    assert checked(tmp_path / "spindle.toml", capsys)["modes_unseen"] == []
+    assert checked(SCENES["hdd_2003"], capsys)["modes_unseen"] == []
