@@ -16,7 +16,7 @@ import scipy
 
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import Layout, Matrices, RotorBase, element_rows, matrices, motion_rows, row_of
-from thermospindle.model.rotor.reduced import FINE, reduced
+from thermospindle.model.rotor.reduced import FINE, HALF, reduced
 from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray, Integers
@@ -71,6 +71,12 @@ class Block:
     vectors: ComplexArray
     inverse: Array
 
+    @cached_property
+    def left(self) -> ComplexArray:
+        """Left vectors (2m, m); kept where poles are `replace`d."""
+        m = len(self.own)
+        return np.asarray(np.linalg.inv(self.vectors)[:, m:] @ self.inverse, complex)
+
 
 @dataclass(frozen=True, eq=False)
 class Poles:
@@ -91,7 +97,7 @@ class Poles:
         found, at = np.zeros(self.right.shape[::-1], complex), 0
         for b in self.blocks:
             m = len(b.own)
-            found[at : at + 2 * m, b.own] = np.linalg.inv(b.vectors)[:, m:] @ b.inverse
+            found[at : at + 2 * m, b.own] = b.left
             at += 2 * m
         return found
 
@@ -235,40 +241,50 @@ def with_mass_between(linear: Matrices, between: Between | None) -> Poles:
 def poles_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray]:
     """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m); of a flexible shaft by
     its reduced model, where `highest` is finite, and with its mass where it is and not at nodes, where that is told."""
-    value, right, _ = _below(linear, highest, between, False)
-    return value, right
-
-
-def vectors_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """The same, with their left vectors (m, n), scaled as those of `Poles`."""
-    return _below(linear, highest, between, True)
-
-
-def _below(linear: Matrices, highest: float, between: Between | None, lefts: bool) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     n = len(linear.mass)
     if n <= LARGE or not np.isfinite(highest):
         p = with_mass_between(linear, between)
         found = oscillating(p, highest, stiffest_of(linear))
-        return p.value[found], p.right[:, found], p.left[found] if lefts else np.zeros((0, n), complex)
-    values, columns, rows, stiffest = [], [], [], 0.0
-    for own in _apart(linear):  # each by itself, so that equal modes of two planes stay in their planes
+        return p.value[found], p.right[:, found]
+    value, right, _ = _reduced_below(linear, highest, highest, FINE, between, False)
+    return value, right
+
+
+def vectors_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """The same, with their left vectors (m, n), scaled as those of `Poles`; of a flexible shaft those up to half of `highest` to 1e-5, the rest to 1e-4."""
+    n = len(linear.mass)
+    if n <= LARGE or not np.isfinite(highest):
+        p = with_mass_between(linear, between)
+        found = oscillating(p, highest, stiffest_of(linear))
+        return p.value[found], p.right[:, found], p.left[found]
+    return _reduced_below(linear, highest, highest / 2, HALF, between, True)
+
+
+def _reduced_below(
+    linear: Matrices, highest: float, band: float, sizes: tuple[float, float], between: Between | None, lefts: bool
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """By reduced models of each part that moves by itself, so that equal modes of two planes stay in their planes; those are for a `band` (Hz), with `sizes` of what they leave out."""
+    parts, stiffest = [], 0.0
+    for own in _apart(linear):
         grid = np.ix_(own, own)
         part = Matrices(linear.mass[grid], linear.damping[grid], linear.stiffness[grid], ())
-        small = reduced(part, np.zeros((0, len(own))), HERTZ * highest, *FINE)
+        small = reduced(part, np.zeros((0, len(own))), HERTZ * band, *sizes)
         q = small.basis
         added = None if between is None else (q.T @ between[0][grid] @ q, q.T @ between[1][grid] @ q, q.T @ between[2][grid] @ q)
-        p = with_mass_between(Matrices(small.mass, small.damping, small.stiffness, ()), added)
-        right, left = np.zeros((n, len(p.value)), complex), np.zeros((len(p.value) if lefts else 0, n), complex)
-        right[own] = q @ p.right
-        if lefts:
-            left[:, own] = p.left @ q.T
-        values.append(p.value)
-        columns.append(right)
-        rows.append(left)
+        parts.append((own, q, with_mass_between(Matrices(small.mass, small.damping, small.stiffness, ()), added)))
         stiffest = max(stiffest, small.stiffest)
-    whole = Poles(np.concatenate(values), np.concatenate(columns, axis=1), ())
-    found = oscillating(whole, highest, stiffest)
-    return whole.value[found], whole.right[:, found], np.concatenate(rows)[found] if lefts else np.zeros((0, n), complex)
+    value = np.concatenate([p.value for _, _, p in parts])
+    found = np.array(oscillating(Poles(value, np.zeros((0, len(value)), complex), ()), highest, stiffest), int)
+    n, first = len(linear.mass), 0
+    right, left = np.zeros((n, len(found)), complex), np.zeros((len(found) if lefts else 0, n), complex)
+    for own, q, p in parts:
+        here = np.flatnonzero((found >= first) & (found < first + len(p.value)))
+        which = found[here] - first
+        right[np.ix_(own, here)] = q @ p.right[:, which]
+        if lefts:
+            left[np.ix_(here, own)] = p.left[which] @ q.T
+        first += len(p.value)
+    return value[found], right, left
 
 
 def oscillating(p: Poles, highest: float = np.inf, stiffest: float = 0.0) -> list[int]:

@@ -9,7 +9,7 @@ import pytest
 
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import modes, oscillating, poles
+from thermospindle.model.rotor.modes import modes, oscillating, poles, poles_below, vectors_below
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import HERTZ, RPM
@@ -53,6 +53,21 @@ def test_poles_of_the_reduced_model_in_the_band(scene: str, rpm: float):
     near = of_small.value[np.abs(of_small.value[None, :] - own[:, None]).argmin(axis=1)]
     assert len(own) >= 4
     np.testing.assert_allclose(np.abs(near), np.abs(own), rtol=3e-5)
+
+
+@pytest.mark.parametrize(("scene", "rpm"), CASES)
+def test_vectors_of_a_coarser_model(scene: str, rpm: float):
+    """As many modes as the finer one has, those up to half of the highest asked for to 1e-5; left and right vectors belong together, left (2 p M + C) right being one."""
+    spindle, whole, _, _ = _both(scene, rpm)
+    highest = 2.5 * spindle.hammer.band[1]
+    fine, _ = poles_below(whole, highest)
+    value, right, left = vectors_below(whole, highest)
+    assert len(value) == len(fine)
+    half = np.abs(fine) < HERTZ * highest / 2
+    np.testing.assert_allclose(value[half], fine[half], rtol=1e-5)
+    np.testing.assert_allclose(np.abs(value), np.abs(fine), rtol=1e-4)
+    one = np.einsum("kn,nk->k", left, 2 * value * (whole.mass @ right) + whole.damping @ right)
+    np.testing.assert_allclose(one[half], 1.0, rtol=1e-4)
 
 
 def test_a_basis_of_all_modes_is_exact():
