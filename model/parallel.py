@@ -39,6 +39,7 @@ ENVIRONMENT = {
 
 _last: tuple[int, float] = (0, 0.0)  # how many workers were last at work, until when
 _inside = False  # this process is a worker
+_watcher: Callable[[int, int], object] | None = None  # who is told how many items are done, and of how many
 
 
 def cores() -> int:
@@ -66,17 +67,36 @@ def in_parallel(
     Within a worker nothing is parallel.
     """
     waiting, results = list(items), list[Result]()
+    count = len(waiting)
     workers = min(workers or cores(), len(waiting))
     patience = 0.0 if _running(workers) else START
     began = time.perf_counter()
     while waiting and (workers < 2 or _inside or len(waiting) == 1 or time.perf_counter() - began < patience):
         results.append(function(waiting.pop(0)))
         done(results[-1])
+        _tell(len(results), count)
     if waiting:
         for result in _sent(function, waiting, workers):
             results.append(result)
             done(result)
+            _tell(len(results), count)
     return results
+
+
+@contextmanager
+def watched(told: Callable[[int, int], object]) -> Iterator[None]:
+    """Within it `told` is called with how many items `in_parallel` has done, and of how many, after each."""
+    global _watcher
+    before, _watcher = _watcher, told
+    try:
+        yield
+    finally:
+        _watcher = before
+
+
+def _tell(done: int, of: int) -> None:
+    if _watcher is not None:
+        _watcher(done, of)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from thermospindle.model.errors import visible
+from thermospindle.model.parallel import watched
 
 FIRST, EVERY = 10.0, 30.0
 """s before the first plain line, and between one and the next: short work says nothing."""
@@ -29,8 +30,15 @@ def progress_bar(steps: int | Sequence[float]) -> Iterator[Callable[[str], None]
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as bar:
-        task, left = bar.add_task("starting", total=sum(takes)), iter(takes)
-        yield lambda done: bar.update(task, advance=next(left, 0.0), description=done)
+        task, left, last = bar.add_task("starting", total=sum(takes)), iter(takes), "starting"
+
+        def told(what: str) -> None:
+            nonlocal last
+            last = what
+            bar.update(task, advance=next(left, 0.0), description=what)
+
+        with watched(lambda done, of: bar.update(task, description=last + _at_hand((done, of)))):
+            yield told
 
 
 def hint(words: str) -> None:
@@ -45,23 +53,29 @@ def plain_lines(takes: Sequence[float] | None = None) -> Iterator[Callable[[str]
     """The same in lines, told at their times however long a step takes; without what they take where nobody knows how many there will be."""
     began, done, last = time.monotonic(), 0, "starting"
     needed = 0.0  # for what has been done
+    at_hand = 0, 0
     ended = threading.Event()
 
     def told(what: str) -> None:
-        nonlocal done, last, needed
-        done, last, needed = done + 1, what, time.monotonic() - began
+        nonlocal done, last, needed, at_hand
+        done, last, needed, at_hand = done + 1, what, time.monotonic() - began, (0, 0)
+
+    def within(part: int, of: int) -> None:
+        nonlocal at_hand
+        at_hand = part, of
 
     def tell() -> None:
         wait = FIRST
         while not ended.wait(wait) and sys.stderr is not None:  # closed by the caller: `print` would take standard output
             with suppress(OSError, ValueError):  # whoever read it has gone
-                print(_line(time.monotonic() - began, needed, done, takes, last), file=sys.stderr, flush=True)
+                print(_line(time.monotonic() - began, needed, done, takes, last) + _at_hand(at_hand), file=sys.stderr, flush=True)
             wait = EVERY
 
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()
     try:
-        yield told
+        with watched(within):
+            yield told
     finally:
         ended.set()
         teller.join()
@@ -77,6 +91,12 @@ def _line(seconds: float, needed: float, done: int, takes: Sequence[float] | Non
         this, others = unit * takes[done], unit * sum(takes[done + 1 :])
         left = f", about {_duration(others + this - late)} left" if late < this else f", more than {_duration(others)} left" if others >= 1 else ""
     return f"{_duration(seconds)}: {min(done, steps)} of {steps} steps done{left}; last: {visible(last)}"
+
+
+def _at_hand(parts: tuple[int, int]) -> str:
+    """How far the pieces are that a step is made of, all of one kind: a long step is seen to go on."""
+    done, of = parts
+    return f"; at hand: {done} of {of}" if 0 < done < of else ""
 
 
 def _duration(seconds: float) -> str:

@@ -13,6 +13,7 @@ from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.verdict import STEPS
+from thermospindle.model.parallel import in_parallel
 from thermospindle.report import progress
 from thermospindle.report.verbs import compare
 
@@ -38,6 +39,25 @@ def test_long_work_tells_plain_lines_and_short_work_none(impatient: None, capsys
     with progress.progress_bar(4) as done:
         done("all")
     time.sleep(0.1)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_long_step_is_seen_to_go_on(impatient: None, capsys: pytest.CaptureFixture[str]):
+    """How many of its pieces are done, until the step is."""
+
+    def piece(k: int) -> int:
+        time.sleep(0.15)
+        return k
+
+    with progress.progress_bar(2) as done:
+        assert in_parallel(piece, range(3), workers=1) == [0, 1, 2]
+        done("first")
+        time.sleep(0.15)
+    lines = capsys.readouterr().err.splitlines()
+    assert "0 s: 0 of 2 steps done; last: starting; at hand: 1 of 3" in lines
+    assert "0 s: 0 of 2 steps done; last: starting; at hand: 2 of 3" in lines
+    assert "at hand" not in lines[-1]
+    in_parallel(piece, range(2), workers=1)
     assert capsys.readouterr().err == ""
 
 
