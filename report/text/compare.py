@@ -106,7 +106,7 @@ def verdict(c: Comparison) -> str:
     every = [(t, m) for t in c.tests for m in t.modes]
     if c.rms_residual < AGREES:
         turned = [f"{m.measured:.0f} Hz of {t.test.id}" for t, m in every if unlike(m)]
-        return f"{sentence}; but the shape measured at {_first(turned)} has nothing of the computed one (MAC below {UNLIKE:g})." if turned else f"{sentence}."
+        return f"{sentence}; but the shape measured at {_first(turned)} has nothing of the computed one (MAC below {UNLIKE:g})." if turned else f"{sentence}{_alone(c)}."
     alone = max((abs(m.residual) for _, m in every), default=0.0)
     if alone < c.rms_residual and not any(t.missing for t in c.tests):
         t, m, off = max(((t, m, abs(m.damping_residual or 0.0)) for t, m in every), key=lambda row: row[2])
@@ -127,6 +127,24 @@ def verdict(c: Comparison) -> str:
     _, largest = far = max(alike, key=lambda row: abs(row[1].error))
     in_hertz = "" if largest is m else f"; in Hz it is {_mode(*far)} {_off(largest)}"
     return f"{sentence}; {'of the others ' if lost else ''}furthest off in standard errors is {_mode(t, m)} {_off(m)} ({abs(m.residual):.3g} standard errors){in_hertz}."
+
+
+def _alone(c: Comparison) -> str:
+    """Where errors agree together, the mode that does not alone, in all its tests; else empty."""
+    by_number: dict[int, list[PairedMode]] = {}
+    for t in c.tests:
+        for m in t.modes:
+            by_number.setdefault(m.number, []).append(m)
+    off = {number: float(np.sqrt(np.mean([m.residual**2 for m in modes]))) for number, modes in by_number.items()}
+    worst = max(off, key=lambda number: off[number], default=None)
+    if worst is None or off[worst] < AGREES:
+        return ""
+    modes = by_number[worst]
+    mean = float(np.mean([m.error for m in modes]))
+    return (
+        f", taken together, for what errors of one test have in common, as its temperature, makes up for much; taken alone, frequencies of mode {worst} ({modes[0].kind}) "
+        f"are off by {off[worst]:.1f} rms, in the mean by {mean:+.3g} Hz"
+    )
 
 
 def without_modes(c: Comparison) -> str:
