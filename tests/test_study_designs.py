@@ -64,6 +64,11 @@ def test_what_does_not_repeat_is_unknown_without_balls(tmp_path, capsys):
     assert "roll no balls: what does not repeat every revolution (NRRO, asynchronous error motion) is unknown" in " ".join(said.err.split())
     told = {" ".join(line.split()[:6]): line.split()[-3:] for line in said.out.splitlines() if line.strip()}
     assert told["root mean square of the nonrepeatable"] == told["six standard deviations of the nonrepeatable"] == ["-", "-", "-"]
+    assert main(["runout", "mk7702", "--path", "linear", "--seconds", "0.1", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["nrro_um"] == answer["averaged"]["nrro_um"] == answer["asynchronous_error_um"] == {"radial": None, "radial_y": None, "axial": None}
+    assert answer["imperfections"] == "drawn from seed 0"  # as map and report have them: the scene names none
+    assert answer["rro_um"]["radial"] > 1e-5
 
 
 def test_drawn_designs_are_drawn_apart_and_gone_on_with(tmp_path, capsys):

@@ -49,6 +49,9 @@ GRADES: Mapping[str, Grade] = {
 """G 0.4, 1, 2.5 with ball grades G3, G5, G10; size and decay of the race spectrum are assumed, of the size of roundness limits of
 instrument bearings (0.1 to 0.5 um peak to valley)."""
 
+PLAUSIBLE = 0
+"""Seed of the imperfections of a scene that names none: in runout, map and report the same."""
+
 RACE_ORDERS = 3
 """Race waves are drawn up to this multiple of the number of balls, and one order more."""
 

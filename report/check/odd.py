@@ -233,7 +233,7 @@ def _running(found: Looked) -> Iterator[str]:
     spindle = found.spindle
     own = spindle.imperfections
     if spindle.structure.turns and not (own.unbalance or own.couple_unbalance or own.bearings):
-        yield "no imperfections are told, so that the turning spindle has no runout; imperfections.seed and grade draw plausible ones"
+        yield "no imperfections are told: runout, map and report draw plausible ones of seed 0; the table [imperfections] holds the spindle's own, or a seed and a grade"
     turning = {b.name for b in spindle.structure.bodies if b.turns}
     for joint in spindle.structure.joints:
         for one, other in (joint.bodies, joint.bodies[::-1]):

@@ -42,7 +42,7 @@ def motion_figure(runout: Runout) -> Figure:
         for place, name, title in ((1, X, f"Radial error motion ({where} x)"), (2, Y, f"Radial error motion ({where} y)"), (3, AXIAL, "Axial error motion")):
             axes = figure.add_subplot(whole[place], projection="polar")
             assert isinstance(axes, PolarAxes)
-            _polar(axes, cut, names.index(name), values[name], title, name != AXIAL)
+            _polar(axes, cut, names.index(name), values[name], title, name != AXIAL, bool(runout.point.spindle.rolling))
         handles, labels = figure.axes[1].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure
@@ -65,7 +65,7 @@ def _orbit(axes: Axes, cut: Revolutions, x: int, y: int, where: str) -> None:
     axes.set_title(f"Orbit, {cut.count} revolutions")
 
 
-def _polar(axes: PolarAxes, cut: Revolutions, probe: int, quoted: ErrorMotion, title: str, radial: bool) -> None:
+def _polar(axes: PolarAxes, cut: Revolutions, probe: int, quoted: ErrorMotion, title: str, radial: bool, rolls: bool) -> None:
     """Displacement over angle on a base circle; a radial plot about its least-squares circle, which is drawn.
 
     Revolutions are one line that goes on from each to the next: a motion that does not repeat does not end where it began.
@@ -89,8 +89,8 @@ def _polar(axes: PolarAxes, cut: Revolutions, probe: int, quoted: ErrorMotion, t
     axes.set_rlabel_position(100)
     axes.tick_params(axis="y", labelsize=7)
     axes.set_title(title, pad=10)
-    errors = {"total": quoted.total_error, "synchronous": quoted.synchronous_error, "asynchronous": quoted.asynchronous_error}
-    text = "\n".join(f"{name} {TO_NM * value:.3g} nm" if TO_NM * value > 1e-3 else f"{name} 0 nm" for name, value in errors.items())
+    errors = {"total": quoted.total_error, "synchronous": quoted.synchronous_error} | ({"asynchronous": quoted.asynchronous_error} if rolls else {})
+    text = "\n".join(f"{name} {TO_NM * value:.3g} nm" if TO_NM * value > 1e-3 else f"{name} 0 nm" for name, value in errors.items()) + ("" if rolls else "\nasynchronous unknown")
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=7.5, linespacing=1.35)
 
 
@@ -105,7 +105,7 @@ def polar_figure(runout: Runout, size: tuple[float, float]) -> Figure:
         axes = figure.add_subplot(projection="polar")
         assert isinstance(axes, PolarAxes)
         index = [p.name for p in runout.signals.probes].index(X)
-        _polar(axes, runout.by_lines, index, runout.values()[X], "", True)
+        _polar(axes, runout.by_lines, index, runout.values()[X], "", True, bool(runout.point.spindle.rolling))
     return figure
 
 

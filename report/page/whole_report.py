@@ -10,7 +10,7 @@ import numpy as np
 
 from thermospindle.diagnosis.ladder.ladder import ladder
 from thermospindle.diagnosis.runout.lines import modal_tests
-from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.drawn import PLAUSIBLE, drawn
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
@@ -22,7 +22,6 @@ from thermospindle.report.text.warmup import warmup_section
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.grid import SEED
 from thermospindle.sim.resonance.map import fastest, resonance_map, stages
 from thermospindle.sim.run import Run
 from thermospindle.sim.running.runout import planned, runout, with_imperfections
@@ -63,7 +62,7 @@ def turning(spindle: Spindle, temperatures: Sequence[float], speed: float, progr
     def of_runout() -> Section:
         point, seed = operating_point(spindle, condition), None
         if point.imperfections == Imperfections():
-            point, seed = operating_point(with_imperfections(spindle, drawn(spindle, SEED)), condition), SEED
+            point, seed = operating_point(with_imperfections(spindle, drawn(spindle, PLAUSIBLE)), condition), PLAUSIBLE
         path = planned(point).path
         found = runout(point, path=path)
         return runout_section(found, runout_json(found, path, "linear", seed))

@@ -45,18 +45,19 @@ MAIN = {"radial": X, "radial_y": Y, "axial": AXIAL}
 SHOWN = 14  # lines in the terminal
 
 
-def _quoted(m: ErrorMotion) -> dict[str, float]:
+def _quoted(m: ErrorMotion, rolls: bool) -> dict[str, float | None]:
     values = (
         m.repeatable, m.nonrepeatable, m.total, m.repeatable_rms, m.nonrepeatable_rms, m.six_sigma,
         m.total_error, m.synchronous_error, m.asynchronous_error, m.eccentricity,
     )  # fmt: skip
-    return {name: TO_UM * v for name, v in zip(STATISTICS, values, strict=True)}
+    return {name: TO_UM * v if rolls or name not in NONREPEATABLE else None for name, v in zip(STATISTICS, values, strict=True)}
 
 
 def runout_json(runout: Runout, path: str, element: str, seed: int | None) -> dict[str, Any]:
     """The answer: values by direction, the lines strongest first, every probe, and how they were made."""
-    quoted = {name: _quoted(m) for name, m in runout.values().items()}
-    averaged = {name: _quoted(m) for name, m in runout.values(averaged=True).items()}
+    rolls = bool(runout.point.spindle.rolling)
+    quoted = {name: _quoted(m, rolls) for name, m in runout.values().items()}
+    averaged = {name: _quoted(m, rolls) for name, m in runout.values(averaged=True).items()}
     leaked = dict(zip(quoted, (TO_UM * runout.leaked).tolist(), strict=True))
     condition = runout.point.condition
     time = runout.averaged.time
@@ -127,7 +128,7 @@ def show_runout(console: Console, answer: dict[str, Any], spindle: Spindle) -> N
     title += f" ({_of_contact(answer)})" if spindle.bearings else ""
     quoted = grid(title, ("", f"radial\n({where} x)", f"radial\n({where} y)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():
-        quoted.add_row(meaning, *(f"{answer[key][d]:.4f}" if _known(key, spindle) else "-" for d in MAIN))
+        quoted.add_row(meaning, *("-" if (value := answer[key][d]) is None else f"{value:.4f}" for d in MAIN))
     console.print(quoted)
     console.print()
     if not answer["lines"]:
@@ -138,10 +139,6 @@ def show_runout(console: Console, answer: dict[str, Any], spindle: Spindle) -> N
         numbers = (f"{row['frequency_Hz']:.2f}", f"{row['order']:.3f}", row["direction"], f"{row['amplitude_um']:.4f}", row["whirl"])
         rows.append([*numbers, row["name"], row["cause"], _bearings(row)])
     show_grid(console, f"Strongest lines of {len(answer['lines'])}", columns, rows, (*columns[4:], "direction"), keys=2)
-
-
-def _known(key: str, spindle: Spindle) -> bool:
-    return bool(spindle.rolling) or key not in NONREPEATABLE
 
 
 def _bearings(row: dict[str, Any]) -> str:
@@ -215,7 +212,7 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
         "spectrum": "Amplitude over frequency; a mark is a line fitted at its known frequency.",
     }
     drawn = pictures(figures(runout), captions, "runout-")
-    quoted = [[escape(meaning), *(f"{1e3 * answer[key][d]:.2f}" if _known(key, runout.point.spindle) else "-" for d in MAIN)] for key, meaning in STATISTICS.items()]
+    quoted = [[escape(meaning), *("-" if (value := answer[key][d]) is None else f"{1e3 * value:.2f}" for d in MAIN)] for key, meaning in STATISTICS.items()]
     lines = [
         [
             f"{g['frequency_Hz']:.2f}", f"{g['order']:.3f}", g["direction"], f"{1e3 * g['amplitude_um']:.2f}", escape(g["name"]),

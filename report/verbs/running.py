@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model import sense
-from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.drawn import PLAUSIBLE, drawn
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import MINUTE, RPM
@@ -59,7 +60,13 @@ def runout(
     speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
     _ = spindle.turning  # refused where nothing turns
     check_element(spindle, element)
-    point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed))
+    condition = Condition(temperature_or_reference(temperature, spindle), speed)
+    point = operating_point(spindle, condition)
+    names_none = seed is None and point.imperfections == Imperfections()
+    if names_none:
+        seed = PLAUSIBLE
+        spindle = with_imperfections(spindle, drawn(spindle, seed))
+        point = operating_point(spindle, condition)
     plan = planned(point, seconds, element, path)
     with progress_bar(plan.pieces + 5) as progress:
         found = simulated_runout(point, seconds, element, plan.path, progress)
@@ -68,12 +75,11 @@ def runout(
         odd = doubts(spindle, [point])
         if path is None and plan.path == "linear":
             odd.append("the stiffest mode of the model takes more steps than a record can have: the exact harmonic answer is taken, as --path linear does")
-        if not found.lines:
+        if names_none:
             odd.append(
-                "the scene names no imperfections, so nothing moves; --seed 1 draws plausible ones, and the table [imperfections] of the "
-                "scene holds its own"
+                f"the scene names no imperfections: plausible ones are drawn, of seed {seed} as map and report have them; --seed draws others, and the table [imperfections] of the scene holds its own"
             )
-        elif not spindle.rolling:
+        if not spindle.rolling:
             odd.append("the bearings are given by numbers and roll no balls: what does not repeat every revolution (NRRO, asynchronous error motion) is unknown, and not in the total")
 
         def write(folder: Path, answer: dict[str, Any]) -> None:

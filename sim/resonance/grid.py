@@ -9,7 +9,7 @@ import numpy as np
 
 from thermospindle.model.bearing.kinematics import Line, lines, row_kinematics
 from thermospindle.model.bearing.pair import check_centred
-from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.drawn import PLAUSIBLE, drawn
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
@@ -30,7 +30,6 @@ BEYOND = 1.6  # times the highest mode at the nominal condition, up to which mod
 EXACT = 60  # crossings of a flexible spindle that are found exactly
 STRONGEST = 6  # of those beyond the grid that are
 PARTS = 20  # of many crossings, after each of which progress is told
-SEED = 0  # of the imperfections of a scene that names none
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +74,7 @@ class Grid:
         self.ratio = speed_ratio(spindle)
         self.given, self.drawn_from = imperfections, None
         if imperfections is None and first.imperfections == Imperfections():
-            self.given, self.drawn_from = drawn(spindle, SEED), SEED
+            self.given, self.drawn_from = drawn(spindle, PLAUSIBLE), PLAUSIBLE
         start = modes(first.chain, highest=highest)
         self.first = dict(enumerate(start, 1))
         self.reach = BEYOND * highest

@@ -255,7 +255,7 @@ def test_what_does_not_move_has_no_motion_and_no_spectrum(record):
     still[k] = np.resize(noise, still[k].shape)
     polar = Figure().add_subplot(projection="polar")
     assert isinstance(polar, PolarAxes)
-    _polar(polar, replace(cut, value=still, repeatable=np.zeros_like(cut.repeatable)), k, record.values()[AXIAL], "", False)
+    _polar(polar, replace(cut, value=still, repeatable=np.zeros_like(cut.repeatable)), k, record.values()[AXIAL], "", False, True)
     assert polar.get_ylim()[1] >= LEAST
 
 

@@ -159,7 +159,7 @@ def log_waterfall(recording: rr.RecordingStream, spectra: Sequence[LineSpectrum]
 
 def summary(runout: Runout) -> str:
     """Markdown: what is quoted, and the strongest lines."""
-    condition, where = runout.point.condition, looked_at(runout.point.spindle)
+    condition, where, rolls = runout.point.condition, looked_at(runout.point.spindle), bool(runout.point.spindle.rolling)
     of_what = "" if abs(runout.ratios[0]) == 1 else f" of the {where}"
     shown = {X: f"{where} x", Y: f"{where} y", AXIAL: f"{where} axial"}
     lines = [
@@ -169,8 +169,10 @@ def summary(runout: Runout) -> str:
         "|---|---|---|---|---|---|",
     ]
     for name, m in runout.values().items():
-        row = (m.repeatable, m.nonrepeatable, m.six_sigma, m.synchronous_error, m.asynchronous_error)
-        lines.append(f"| {shown.get(name, name)} | " + " | ".join(f"{TO_NM * v:.1f}" for v in row) + " |")
+        row = (m.repeatable, *((m.nonrepeatable, m.six_sigma) if rolls else (None, None)), m.synchronous_error, m.asynchronous_error if rolls else None)
+        lines.append(f"| {shown.get(name, name)} | " + " | ".join("-" if v is None else f"{TO_NM * v:.1f}" for v in row) + " |")
+    if not rolls:
+        lines += ["", "What does not repeat every revolution is unknown: the bearings are given by numbers and roll no balls."]
     lines += ["", "Strongest lines:", "", "| Hz | | nm | line | cause |", "|---|---|---|---|---|"] if runout.lines else ["", "No line: nothing moves."]
     for g in runout.lines[:16]:
         cause = f"{', '.join(dict.fromkeys(c.bearing for c in g.causes if c.bearing))} {g.causes[0].cause}".strip() if g.causes else "unexplained"
