@@ -16,6 +16,7 @@ from thermospindle.sim.run import Run
 
 CERTAIN = 2.0  # standard errors beyond which a difference is called one
 SAME = 0.05  # N, in which preloads differ that are told as one
+APART = 0.5  # Hz, from which a difference from the published analysis is told of a second temperature
 CLOSE = 0.05  # relative distance of neighbours whose splitting is compared
 
 
@@ -38,13 +39,13 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
         ]
     groups: dict[tuple[str, str], list[int]] = {}
     for row in table.rows:
-        named = (row.published_flexibility, "as published") if row.published_flexibility else (row.flexibility, "by the model")
-        groups.setdefault(named, []).append(row.number)
-    for (name, by), numbers in groups.items():
+        other = row.published_flexibility and row.flexibility.rstrip("s") not in row.published_flexibility
+        groups.setdefault((row.flexibility, f" (published: {row.published_flexibility})" if other else ""), []).append(row.number)
+    for (name, published), numbers in groups.items():
         shifts = [f"{s[0]:+z.1f}" if (s := table.shift("computed", n)) else "gone" for n in numbers]  # as where bearings have lost contact
         modes = f"Mode{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
         alike = {frozenset(["gone"]): "gone", frozenset(["+0.0"]): "less than 0.05 Hz"}.get(frozenset(shifts))
-        cards.append((f"{modes}: {name}, {by}", alike or f"{', '.join(shifts)} Hz", f"computed shift from {cold:g} to {hot:g} °C"))
+        cards.append((f"{modes}: {name} by the model{published}", alike or f"{', '.join(shifts)} Hz", f"computed shift from {cold:g} to {hot:g} °C"))
     return cards
 
 
@@ -90,7 +91,7 @@ def misses(table: Table) -> list[str]:
             apart = f"at most {near:.1f}" if near >= 0.05 else "less than 0.1"
             sentences.append(
                 f"The published analysis misses the measurement too, by up to {far:.1f} Hz at {own.temperature:g} °C; "
-                f"it differs from the model by {apart} Hz."
+                f"it differs from the model by {apart} Hz.{_parted(table, both)}"
             )
     for name in dict.fromkeys(r.published_flexibility for r in table.rows if r.published_flexibility):
         other = [r for r in table.rows if r.published_flexibility == name and r.flexibility.rstrip("s") not in name]
@@ -101,6 +102,17 @@ def misses(table: Table) -> list[str]:
                 f"sits elsewhere ({'; '.join(shares)})."
             )
     return sentences
+
+
+def _parted(table: Table, numbers: Sequence[int]) -> str:
+    """At which other temperature the published analysis is farthest from the model, where that is more than `APART`; else empty."""
+    found = []
+    for temperature in table.temperatures[1:]:
+        paper, own = (table.of(source, temperature) for source in ("published", "computed"))
+        if paper is not None and own is not None:
+            found += [(abs(paper.value[n][0] - own.value[n][0]), temperature) for n in numbers if n in paper.value and n in own.value]
+    most, where = max(found, default=(0.0, 0.0))
+    return f" At {where:g} °C they differ by up to {most:.1f} Hz." if most > APART else ""
 
 
 def _frequency_misses(table: Table, measured: Peaks, own: Peaks) -> Iterator[str]:

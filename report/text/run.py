@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.model.errors import listed
 from thermospindle.model.files.stiffness_table import write_table
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.modes import Mode, group_energy
@@ -98,8 +99,16 @@ def show_impact(console: Console, step: Step) -> None:
         width = 2 * computed[k].damping_ratio * computed[k].frequency
         console.print(f"The peak at {m.frequency[k]:.2f} Hz stands for {one:.2f} and {other:.2f} Hz ({computed[k].kind}), which at a width of {width:.3g} Hz this test does not part.", highlight=False)
     unseen = [mode for i, mode in enumerate(step.point.modes) if low <= mode.frequency <= high and i not in seen and i not in shared]
-    if unseen:
+    twins = [mode for mode in unseen if any(abs(mode.frequency / c.frequency - 1) < TWIN and mode.kind == c.kind for c in computed.values())]
+    if twins:
+        these = listed([f"{mode.frequency:.2f}" for mode in twins])
+        console.print(f"At {these} Hz the model has a second mode of the same frequency, which moves across the first one: one peak stands for both.", highlight=False)
+    if unseen := [mode for mode in unseen if not any(mode is twin for twin in twins)]:
         console.print(f"No peak was found of {', '.join(f'{m.frequency:.2f} Hz ({m.kind})' for m in unseen)}. {_struck(step.point.spindle)}")
+
+
+TWIN = 1e-6
+"""Relative, within which two modes of one kind have one frequency, as a rotor's in two planes that are alike."""
 
 
 def _shared(step: Step, seen: Mapping[int, int]) -> dict[int, int]:

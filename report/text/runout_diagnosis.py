@@ -150,11 +150,9 @@ def would_change(d: RunoutDiagnosis) -> str:
         first, second = d.next[0].separates
         return f"A test {d.next[0].plan.changed} would tell {first} from {second}."
     rivals = [e for e in d.explanations if set(e.effects) - set(d.effects) and len(e.effects) <= len(d.effects)]
-    rival = (
-        f"{' + '.join(rivals[0].effects)}, {behind(d.explanations[0].delta_evidence - rivals[0].delta_evidence)}"
-        if rivals
-        else "none"
-    )
+    if not rivals:
+        return "Records that another explanation predicts better would change that: none of the catalogue comes near."
+    rival = f"{' + '.join(rivals[0].effects)}, {behind(d.explanations[0].delta_evidence - rivals[0].delta_evidence)}"
     return f"Records that the next best explanation ({rival}) predicts better would change that."
 
 

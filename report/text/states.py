@@ -246,6 +246,8 @@ def show_static(console: Console, values: dict[str, Any], answers: Sequence[Arou
     )
     if any(along == "axis" for _, along, _ in rows):
         console.print("axis: a force along it, on the axis at the point's height.")
+    if values["bearings"] == "rated":
+        console.print("rated: bearings are springs of the stiffness that they are rated at, to rigid ground; --bearings computed has them as they are loaded, and what they stand in.")
     if not parts:
         return  # every point is free to move
     shares = {part: [f"{100 * row['compliance_shares'].get(part, 0.0):z.1f}" for row in points.values()] for part in parts}

@@ -99,6 +99,19 @@ def test_modes_that_an_impact_test_does_not_show_are_named(run: Run):
     assert said[1].split(", ") == [f"{m.frequency:.2f} Hz ({m.kind})" for m in unseen]
 
 
+def test_a_peak_of_two_planes_that_are_alike_stands_for_both(run: Run):
+    """The second mode of one frequency and kind is no mode that was missed: a hammer along one axis cannot show it by itself."""
+    step = run.steps[0]
+    mode = step.point.modes[next(iter(identified(step)))]
+    alike = replace(step, point=replace(step.point))
+    vars(alike.point)["modes"] = [*step.point.modes, replace(mode)]
+    out = StringIO()
+    show_impact(Console(file=out, width=400), alike)
+    said = " ".join(out.getvalue().split())
+    assert f"At {mode.frequency:.2f} Hz the model has a second mode of the same frequency, which moves across the first one: one peak stands for both." in said
+    assert f"{mode.frequency:.2f} Hz" not in said.split("No peak was found of", 1)[-1].split("The hammer strikes")[0]
+
+
 def test_a_peak_that_stands_for_two_modes_says_so(run: Run):
     """The second of a pair nearer than a half-width is not merely unseen, and the one that took its peak is not what is furthest off."""
     step = run.steps[0]

@@ -122,7 +122,9 @@ def would_change(d: Diagnosis) -> str:
         test += f" {' + '.join(rivals[0].names)} would need a size that it cannot have."
     elif rivals and not d.tests:
         test = f" No other temperature or speed tells {' + '.join(v.candidates[0].names)} from {' + '.join(rivals[0].names)}."
-    rival = f"{' + '.join(rivals[0].names)}, {behind(v.candidates[0].delta_evidence - rivals[0].delta_evidence)}" if rivals else "none"
+    if not rivals:
+        return f"Data that another explanation predicts better would change that: none of the catalogue comes near.{test}"
+    rival = f"{' + '.join(rivals[0].names)}, {behind(v.candidates[0].delta_evidence - rivals[0].delta_evidence)}"
     return f"Data that the next best explanation ({rival}) predicts better would change that.{test}"
 
 
