@@ -100,4 +100,4 @@ def _at_hand(parts: tuple[int, int]) -> str:
 
 
 def _duration(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
+    return f"{seconds:.0f} s" if seconds < 119.5 else f"{round(seconds) // 60}:{round(seconds) % 60:02d} min"

@@ -35,7 +35,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         sizes = found.base.evidence.learned.sizes
         wrong, change, misjudged = (sizes.get(kind, 0.0) for kind in (kinds_of.STIFFNESS, kinds_of.CHANGE, kinds_of.OF_CONDITIONS))
         which = "; one condition cannot tell that from a missing effect" if len(conditions_of(found.model.spindle, found.model.tests)) == 1 else ""
-        constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
+        constant = f", the model's frequencies being constantly wrong by about {100 * wrong:.1g} % of each{which}" if wrong > NUMERICS[0] else ""
         otherwise = f", what speed does to the balls' stiffness being wrong by about {change:.0%} of it, and what temperature does by a little" if change else ""
         otherwise += f", what temperature and speed do to each mode being wrong by about {misjudged:.0%} of it" if misjudged else ""
         return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{otherwise}{best}."
@@ -92,7 +92,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     told = [c for c in (*candidates, *free) if set(named_part(c)) == set(effects)]
     chosen = max(told, key=lambda c: c.probability)
     without, within = (h.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) for h in (found.base, chosen.hypothesis))
-    instead = f"; without, the model's frequencies would have to be constantly wrong by about {without:.1g} of each" if without > 10 * within else ""
+    instead = f"; without, the model's frequencies would have to be constantly wrong by about {100 * without:.1g} % of each" if without > 10 * within else ""
     rest = 1 - sum(c.probability for c in told)
     odds = "all else together is less probable than 1 in 1000" if rest < 1e-3 else f"all else together has a probability of {rest:.1%}"
     word_of = "is the explanation" if len(effects) == 1 else "are both needed" if len(effects) == 2 else "are all needed"

@@ -11,6 +11,7 @@ from thermospindle.model.scene.fields import Table
 from thermospindle.model.scene.measuring import Measuring, Point
 from thermospindle.model.scene.section import Section
 from thermospindle.model.scene.shafts import COARSE, ShaftForm
+from thermospindle.model.scene.structure import Structure
 from thermospindle.model.scene.thermal import MOVED_AIR, STILL_AIR, Thermal
 
 GENTLE = 100_000.0
@@ -56,6 +57,9 @@ class Told(Protocol):
     @property
     def shafts(self) -> list[ShaftForm]: ...
 
+    @property
+    def structure(self) -> Structure: ...
+
     def speed_rpm(self) -> float: ...
 
 
@@ -83,7 +87,7 @@ def assumed(scene: Told, told: Mapping[str, m.Provenance]) -> dict[str, m.Proven
         for key, value in (("f0", "2"), ("f1", "0.0003"), ("conductance_W_per_K", "0.05"), ("kinematic_viscosity_mm2_per_s", "26 at 40 C, a light grease's")):
             if key not in scene.thermal.friction.model_fields_set:
                 found[f"thermal.friction.{key}"] = m.Provenance("assumed", f"assumed default: {value}")
-    if scene.nominal_speed_rpm is None:
+    if scene.nominal_speed_rpm is None and any([*(s.turns for s in scene.shafts), *(b.turns for b in scene.structure.bodies)]):
         said = f"assumed default: {scene.speed_rpm():g} rpm, a speed parameter of {GENTLE:g} mm rpm"
         found["nominal_speed_rpm"] = m.Provenance("assumed", said)
     if scene.temperature_range_C is None:

@@ -144,9 +144,14 @@ def told(warmup: Warmup) -> str:
     end, begin = warmup.steady, warmup.moments[0].preload
     first = max((b.name for b in warmup.spindle.bearings), key=lambda b: abs(end.preload[b] - begin[b]) / max(abs(begin[b]), 1e-9), default=None)
     warm = ", ".join(f"{name} {t:.1f} C" for name, t in end.bearing_temperatures.items()) or f"the hottest region {max(end.temperatures.values()):.1f} C"
-    pressed = "" if first is None else f", the preload of {first} goes from {warmup.moments[0].preload[first]:.2f} to {end.preload[first]:.2f} N"
+    pressed = "" if first is None else _pressed(first, begin[first], end.preload[first])
     near = f"it is near runaway, {warmup.feedback:.0%} of a load that is added come back as heat" if warmup.feedback > NEAR else "it does not run away"
     return " ".join([f"In the steady state the bearings are at {warm}{pressed}; {near}.", *_on_the_way(warmup)])
+
+
+def _pressed(name: str, begin: float, end: float) -> str:
+    before, after = f"{begin:.2f}", f"{end:.2f}"
+    return f", the preload of {name} stays {after} N" if before == after else f", the preload of {name} goes from {before} to {after} N"
 
 
 def _on_the_way(warmup: Warmup) -> list[str]:

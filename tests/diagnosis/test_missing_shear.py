@@ -44,7 +44,7 @@ def test_the_missing_shear_is_named(measured):
     base, own = (h.evidence.learned.sizes for h in (measured.search.base, verdict.accepted))
     assert base[kinds_of.STIFFNESS] == 1e-2
     assert own[kinds_of.STIFFNESS] < 1e-3
-    assert "constantly wrong by about 0.01 of each" in verdict.reason
+    assert "constantly wrong by about 1 % of each" in verdict.reason
 
 
 def test_what_is_shown_of_a_diagnosis_is_a_line(measured):
