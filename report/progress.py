@@ -17,6 +17,8 @@ from thermospindle.model.parallel import watched
 
 FIRST, EVERY = 10.0, 30.0
 """s before the first plain line, and between one and the next: short work says nothing."""
+TELLS = 0.1
+"""Of all work, done, from which it tells how long the rest takes: first steps are often unlike the others."""
 
 
 @contextmanager
@@ -86,7 +88,7 @@ def _line(seconds: float, needed: float, done: int, takes: Sequence[float] | Non
     if takes is None:
         return f"{_duration(seconds)}: {visible(last)}"
     left, steps = "", len(takes)
-    if 0 < done < steps:
+    if 0 < done < steps and sum(takes[:done]) >= TELLS * sum(takes):
         unit, late = needed / sum(takes[:done]), seconds - needed
         this, others = unit * takes[done], unit * sum(takes[done + 1 :])
         left = f", about {_duration(others + this - late)} left" if late < this else f", more than {_duration(others)} left" if others >= 1 else ""

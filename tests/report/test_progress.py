@@ -69,6 +69,12 @@ def test_the_time_that_is_left_does_not_grow_while_a_step_takes_long():
     assert "about 5 s left" in progress._line(35.0, 30.0, 3, [1.0] * 4, "third")
 
 
+def test_a_first_step_that_takes_long_foretells_nothing_of_eighty():
+    """Its one of 82 steps took 40 s, and 12 minutes were told to be left of one."""
+    assert "left" not in progress._line(40.0, 40.0, 4, [1.0] * 82, "warmed up")
+    assert "about 20 s left" in progress._line(60.0, 60.0, 60, [1.0] * 80, "modes")
+
+
 def test_steps_that_take_longer_are_told_to_do_so():
     """Eight tests are read in 8 s; what fits effects takes eighteen times as long as one of these."""
     takes = [*[1.0] * 8, *STEPS]
