@@ -125,7 +125,7 @@ def _before_after(both: BeforeAfter) -> str:
     rows = [[f"{tests} tests", f"{one:.3g}", f"{other:.3g}"] for tests, one, other in found]
     unseen = f" Held out: {escape(', '.join(both.held_out))}." if both.held_out else ""
     head = ("", f"before,\n{both.before.spindle}", f"after,\n{both.after.spindle}")
-    return table(head, rows, (0,), f"Error, rms in standard errors, before and after.{unseen}", "before-after")
+    return table(head, rows, (0,), f"Error of modes, rms in standard errors, before and after.{unseen}", "before-after")
 
 
 def _table(c: Comparison) -> str:

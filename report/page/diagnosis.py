@@ -72,7 +72,7 @@ def _verdict(answer: dict[str, Any]) -> str:
     drawn = {"": f"{error['drawn']:.2f}", "held_out_": "–"}
     rows = [[name, drawn[which], *(f"{error[which + when]:.2f}" for when in whens)] for name, which in kinds if error[which + "after"] is not None]
     head = ["", "as drawn", "tolerances and constant errors fitted", *(["with what is named"] if answer["effects"] else [])]
-    grid = table(head, rows, caption="Error, rms in standard errors. Constant errors: what a model may be off by at all conditions alike, which the ladder's step \"tolerances fitted\" does not grant.")
+    grid = table(head, rows, caption="Error of the data (FRF lines, modes of tables), rms in standard errors. Constant errors: what a model may be off by at all conditions alike, which the ladder's step \"tolerances fitted\" does not grant.")
     card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
     said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "granted", "would_change") if answer[key]) + "".join(f"<p>{prose(s)}</p>" for s in (*answer["law_departs"], *answer["doubts"]))
     said += f"<p>{prose(hidden_words(answer['may_hide']))}</p>" if answer["may_hide"] else ""

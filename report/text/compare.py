@@ -316,7 +316,7 @@ def _percent(shift: float | None) -> str:
 
 def show_before_after(console: Console, both: BeforeAfter) -> None:
     errors = both.errors()
-    table = grid("Error, rms in standard errors", ("", f"before\n{both.before.spindle}", f"after\n{both.after.spindle}"), ("",))
+    table = grid("Error of modes, rms in standard errors", ("", f"before\n{both.before.spindle}", f"after\n{both.after.spindle}"), ("",))
     for label, which in (("all tests", ""), ("fitted tests", "fitted_"), ("held-out tests", "held_out_")):
         values = [errors[f"{which}{when}"] for when in ("before", "after")]
         if which == "" or (both.held_out and None not in values):

@@ -179,7 +179,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     if answer["may_hide"]:
         console.print(hidden_words(answer["may_hide"]))
     error = answer["error"]
-    console.print(f"Error, rms in standard errors: {error_words(error, bool(answer['effects']))}")
+    console.print(f"Error of the data (FRF lines, modes of tables), rms in standard errors: {error_words(error, bool(answer['effects']))}")
     if not verbose:
         _show_little(console, answer)
         return
