@@ -94,12 +94,28 @@ def law(d: Diagnosis, c: Candidate) -> Figure:
     for k, m in enumerate(c.hypothesis.mechanisms):
         axes = figure.add_subplot(count, 1, k + 1)
         own = c.hypothesis.evidence
-        _over_temperature(axes, conditions, own.sizes[k], np.sqrt(np.maximum(np.diag(own.size_covariance[k]), 0.0)))
+        sd = np.sqrt(np.maximum(np.diag(own.size_covariance[k]), 0.0))
         axes.set_ylabel(", ".join(filter(None, (m.size.name, unit_cell(m.size.unit)))))
-        shared = "one value, fitted to all tests together" if own.learned.departures[k] == 0.0 else "a level line is the law assumed"
-        level = "with a law of the data's own" if m.own_law else shared
+        if own.learned.departures[k] == 0.0 and not m.own_law:
+            _one_value(axes, conditions, float(own.sizes[k][0]), float(sd[0]))
+            axes.set_title(f"{m.name}: its size (one value, fitted to all tests together)")
+            continue
+        _over_temperature(axes, conditions, own.sizes[k], sd)
+        level = "with a law of the data's own" if m.own_law else "a level line is the law assumed"
         axes.set_title(f"{m.name}: its size in every test ({level})")
     return figure
+
+
+def _one_value(axes: Axes, conditions: Sequence[Condition], value: float, sd: float) -> None:
+    """One number of all tests, with a band of one standard error: no measurement in each."""
+    at = [c.temperature for c in conditions]
+    axes.axhspan(value - sd, value + sd, color=NAMED, alpha=0.18, lw=0, label="one standard error")
+    axes.axhline(value, color=NAMED, lw=1.2)
+    axes.plot(at, np.zeros(len(at)), "|", color=INK, ms=8, transform=axes.get_xaxis_transform(), clip_on=False, label="temperatures of the tests")
+    reach = 4 * sd or 1.0
+    axes.set_ylim(value - reach, value + reach)
+    axes.set_xlabel("temperature, °C")
+    axes.legend(frameon=False, fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
 
 
 @rc_context(STYLE)

@@ -25,8 +25,8 @@ CAPTIONS = {
     "errors": "Rms residuals of every test in standard errors of its data: one is noise alone. Fitted to all tests, tolerances and what a model may be constantly off by "
     "can hide what is missing; a condition that is predicted from all others shows it.",
     "explanations": "Green: what the verdict names. Amber: free forms, which drift without a law. Hatched: a fit that has not arrived at its least error, whose number says nothing yet. An arrow: the bar goes on beyond the axis. All tolerances are fitted anew with each.",
-    "law": "The size of the effect as each test has it, with one standard error: where it departs from a level line, this is the law that the data have. Where all tests have exactly "
-    "one value it was fitted to all of them together, since no departure from the law was likeliest: that is one number, and no measurement in every test.",
+    "law": "The size of the effect as each test has it, with one standard error: where it departs from a level line, this is the law that the data have. A line with a "
+    "band is one number that was fitted to all tests together, since no departure from the law was likeliest: no measurement in every test.",
     "drift": "What would have to change in every test, with one standard error, where no effect is named.",
 }
 UNSEEN = 0.9  # standard error over that of the tolerance, from which the data say nothing of a parameter

@@ -71,7 +71,8 @@ def test_one_value_for_all_tests_is_no_measurement_in_each(told):
     for departure, said in ((0.0, "one value, fitted to all tests together"), (0.3, "a level line is the law assumed")):
         evidence = replace(c.hypothesis.evidence, learned=replace(c.hypothesis.evidence.learned, departures=(departure,)))
         drawn = law(found, replace(c, hypothesis=replace(c.hypothesis, evidence=evidence)))
-        assert drawn.axes[0].get_title(loc="left") == f"soak_lag: its size in every test ({said})"
+        assert drawn.axes[0].get_title(loc="left") == f"soak_lag: its size{' in every test' if departure else ''} ({said})"
+        assert bool(drawn.axes[0].containers) == bool(departure)  # error bars of each test, or none
 
 
 def test_the_law_that_departs_is_told_where_something_drifts_beside_it(told):
