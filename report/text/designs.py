@@ -7,6 +7,7 @@ from typing import Any
 from rich.console import Console
 
 from thermospindle.report.text.grid import show_grid
+from thermospindle.report.typeset import plain_error
 
 CONDITIONS = 6  # shown
 
@@ -17,6 +18,8 @@ def show_designs(console: Console, values: dict[str, Any]) -> None:
     for c in values["conditions"][:CONDITIONS]:
         rows = [[f"{figure} ({own['better']} is better)", *(_value(d) for d in own["designs"].values()), _best(own)] for figure, own in c["figures"].items()]
         show_grid(console, f"{c['temperature_C']:g} C, {c['speed_rpm']:g} rpm", ["", *names, "better"], rows, ("", "better"))
+    if any("pairs" in own for c in values["conditions"] for own in c["figures"].values()):
+        console.print("+-: standard deviation of the drawn spindles.")
     for d in values["designs"]:
         if d["in_contact"] is not None and d["in_contact"] < 1:
             console.print(f"{d['design']}: all bearings have contact in {100 * d['in_contact']:.1f} % of its rows")
@@ -24,7 +27,7 @@ def show_designs(console: Console, values: dict[str, Any]) -> None:
 
 def _value(own: dict[str, Any]) -> str:
     if s := own.get("spread"):
-        return f"{s['mean']:.5g} +- {s['sd']:.2g}"
+        return plain_error(s["mean"], s["sd"])
     return "-" if own["nominal"] is None else f"{own['nominal']:.5g}"
 
 

@@ -21,6 +21,7 @@ from thermospindle.sim.identification.numbering import identified, measured_rows
 from thermospindle.sim.operating import provenance, stiffness_table
 from thermospindle.sim.run import Run, Step, as_campaign
 
+MOST_DECIMALS = 12
 MUCH = 0.1  # of what a hammer moves and sensors see of one mode, from which another near it has a part in its peak
 
 # ---------------------------------------------------------------- JSON
@@ -89,8 +90,9 @@ def show_impact(console: Console, step: Step) -> None:
     computed, shared = {k: step.point.modes[i] for i, k in seen.items()}, _shared(step, seen)
     for i, (f, sf, z, sz) in enumerate(zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)):
         exact = computed.get(i)
-        own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:z.3f}")
-        rows.append([f"{f:.2f}", _error(sf, 2), f"{100 * z:.3f}", _error(100 * sz, 3), *own])
+        digits = _decimals(sf, 2), _decimals(100 * sz, 3)
+        own = ("-", "-") if exact is None else (f"{exact.frequency:.{digits[0]}f}", f"{100 * exact.damping_ratio:z.{digits[1]}f}")
+        rows.append([f"{f:.{digits[0]}f}", f"{sf:.{digits[0]}f}", f"{100 * z:.{digits[1]}f}", f"{100 * sz:.{digits[1]}f}", *own])
     console.print(f"{_found(step, computed, set(shared.values()))}\n", highlight=False, markup=False)
     show_grid(console, title, ("f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%"), rows)
     low, high = step.point.spindle.hammer.band
@@ -137,9 +139,9 @@ def _found(step: Step, computed: Mapping[int, Mode], shared: Set[int]) -> str:
     return f"{found}; furthest off is that at {mode.frequency:.2f} Hz, by {off:+.2g} Hz ({100 * off / mode.frequency:+.2g} %, {abs(off) / sd:.1f} of its standard errors)."
 
 
-def _error(value: float, digits: int) -> str:
-    """A standard error with as many digits as the number beside it, or with the first that is not 0: none is that small."""
-    return f"{value:.{digits}f}" if not 0 < value < 0.5 * 10.0**-digits else f"{value:.1g}"
+def _decimals(sd: float, least: int) -> int:
+    """Of a number with a standard error: as many as the error's first digit takes."""
+    return int(np.clip(np.ceil(-np.log10(sd)), least, MOST_DECIMALS)) if 0 < sd < np.inf else least
 
 
 def show_run(console: Console, run: Run, out: Path) -> None:

@@ -134,13 +134,14 @@ def test_a_peak_that_stands_for_two_modes_says_so(run: Run):
 
 
 def test_a_standard_error_is_never_shown_as_none(run: Run):
-    """However small it is, one digit of it is there."""
+    """However small it is, one digit of it is there, and the number beside it has as many decimals."""
     step = run.steps[0]
     small = replace(step, identified=replace(step.identified, covariance=1e-10 * step.identified.covariance))
     out = StringIO()
     show_impact(Console(file=out, width=80), small)
-    rows = [line.split() for line in out.getvalue().splitlines() if re.match(r" *\d+\.\d\d ", line)]
+    rows = [line.split() for line in out.getvalue().splitlines() if re.match(r" *\d+\.\d\d+ ", line)]
     assert len(rows) == len(step.identified.frequency)
+    assert all(len(row[k].split(".")[1]) == len(row[k + 1].split(".")[1]) for row in rows for k in (0, 2))
     assert all(float(row[1]) > 0 and float(row[3]) > 0 for row in rows)
 
 
