@@ -13,7 +13,7 @@ from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.errors import listed
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM, in_rpm
-from thermospindle.report.text.grid import show_grid
+from thermospindle.report.text.grid import OF_LINES, show_grid
 from thermospindle.report.typeset import figure, known, prose, table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.found import NEARBY, Coincidence, ResonanceMap, strongest
@@ -226,7 +226,7 @@ def show_map(console: Console, found: ResonanceMap) -> None:
     console.print(
         f"{len(found.coincidences)} in all. Strength: amplitude of the mode at the {looked_at(found.spindle)} under {_whose(found)}. "
         f"NRRO: of all lines there, - where the line repeats every revolution and NRRO leaves it out. "
-        f"Margin: of the line from the mode at {found.nominal.temperature:g} C, {found.nominal.speed / RPM:g} rpm.",
+        f"Margin: of the line from the mode at {found.nominal.temperature:g} C, {found.nominal.speed / RPM:g} rpm. {OF_LINES}; fw, bw: a mode that whirls forward, backward.",
         highlight=False,
     )
     if found.interpolated:

@@ -17,7 +17,7 @@ from rich.console import Console
 from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import TO_UM, in_rpm
-from thermospindle.report.text.grid import grid, show_grid
+from thermospindle.report.text.grid import OF_LINES, grid, show_grid
 from thermospindle.report.typeset import table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.running.lines import FoundLine
@@ -139,6 +139,8 @@ def show_runout(console: Console, answer: dict[str, Any], spindle: Spindle) -> N
         numbers = (f"{row['frequency_Hz']:.2f}", f"{row['order']:.3f}", row["direction"], f"{row['amplitude_um']:.4f}", row["whirl"])
         rows.append([*numbers, row["name"], row["cause"], _bearings(row)])
     show_grid(console, f"Strongest lines of {len(answer['lines'])}", columns, rows, (*columns[4:], "direction"), keys=2)
+    if spindle.rolling:
+        console.print(f"{OF_LINES}.", highlight=False)
 
 
 def _bearings(row: dict[str, Any]) -> str:

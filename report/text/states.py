@@ -97,6 +97,12 @@ def write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
     write_csv(path, head, rows)
 
 
+def _changes(value: Array) -> bool:
+    """Whether a column of a bearing has more than one value, or is unknown somewhere, over the conditions."""
+    known = np.isfinite(value)
+    return bool(known.any() and not (known.all() and np.ptp(value) == 0.0))
+
+
 def show_table(console: Console, table: StiffnessTable, radial_load: bool = False) -> None:
     """Bearings by condition. At speed, where heavy balls have two angles and forces, angle and force are called those of the inner contact; under a `radial_load` the
     force is called the largest of the balls."""
@@ -109,22 +115,26 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
     told_apart = any(_apart(values) for values in table.values.values())
     shown = [
         ("contact_angle_deg", angle, 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
-        ("contact_force_N", force, 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
-        ("radial_stiffness_N_per_m", "k_xx\nN/um" if told_apart else "k_RR\nN/um", 1e-6, 2), ("radial_stiffness_y_N_per_m", "k_yy\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "k_AA\nN/um", 1e-6, 3),
+        ("contact_force_N", force, 1, 3), ("ball_stiffness_N_per_m", "of a ball\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
+        ("radial_stiffness_N_per_m", "radial x\nN/um" if told_apart else "radial\nN/um", 1e-6, 2), ("radial_stiffness_y_N_per_m", "radial y\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "axial\nN/um", 1e-6, 3),
     ]  # fmt: skip
     shown = [row for row in shown if all(row[0] in values for values in table.values.values()) and (told_apart or row[0] != "radial_stiffness_y_N_per_m")]
+    shown = [row for row in shown if any(np.isfinite(values[row[0]]).any() for values in table.values.values())]
+    constant = table.temperature.size * table.speed.size > 1 and not any(_changes(values[row[0]]) for values in table.values.values() for row in shown)
     columns, rows = ["T\nC", "speed\nrpm", "bearing", *(head for _, head, _, _ in shown)], []
-    for i, temperature in enumerate(table.temperature):
-        for j, speed in enumerate(table.speed):
+    for i, temperature in enumerate(table.temperature[:1] if constant else table.temperature):
+        for j, speed in enumerate(table.speed[:1] if constant else table.speed):
             for name, values in table.values.items():
                 row = ["" if np.isnan(values[c][i, j]) else f"{values[c][i, j] * scale:.{digits}f}" for c, _, scale, digits in shown]
                 rows.append([f"{temperature:g}", f"{speed / RPM:g}", name, *row])
     show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
+    if constant:
+        console.print("The same at every temperature and speed asked for: these bearings are given by constant numbers.")
     rows_of_balls = any("contact_angle_deg" in values and np.isfinite(values["contact_angle_deg"]).any() for values in table.values.values())
     if table.speed.any() and rows_of_balls:
         console.print("Inner angle and force: of the contact with the inner ring; those of the outer one are in table.csv of --out.")
     if radial_load and rows_of_balls:
-        console.print("Under the radial load deformation, force and ball k are those of the most loaded ball; the angle is the mean of all, weighted with their force.")
+        console.print("Under the radial load deformation, force and stiffness of a ball are those of the most loaded ball; the angle is the mean of all, weighted with their force.")
     if any(column in values for values in table.values.values() for column in BETWEEN):
         console.print("Stiffness between these directions, as k_xz, is in table.csv of --out.")
     if pressed := _pressed(table):

@@ -165,3 +165,17 @@ def test_an_effect_of_a_scene_says_what_its_numbers_mean(capsys):
     assert "In this scene: -1 all, 0 front, 1 rear." in " ".join(capsys.readouterr().out.split())
     assert main(["effects", "seat_clearance"]) == 0
     assert "In this scene" not in capsys.readouterr().out
+
+
+def test_a_table_of_constant_numbers_is_one_row_a_bearing(capsys: pytest.CaptureFixture[str]):
+    """Five empty columns and the same row at every temperature; ball rows change, and have a row for each."""
+    assert main(["table", "mk7702"]) == 0
+    said = capsys.readouterr().out
+    assert [len(re.findall(rf"^ *20 .*{name} ", said, re.MULTILINE)) for name in ("front1", "rear1")] == [1, 1]
+    assert not re.search(r"^ *[34]0 ", said, re.MULTILINE)
+    assert "The same at every temperature and speed asked for" in said
+    assert "preload" not in said
+    assert main(["table", "hdd_2003"]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"^ *60 .*upper ", said, re.MULTILINE)
+    assert "The same at every temperature" not in said
