@@ -7,12 +7,14 @@ travel too, and a script needs no `if __name__ == "__main__"`. The workers stay 
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import InvalidStateError
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
@@ -122,9 +124,15 @@ def _pool(workers: int) -> Iterator[Any]:
     try:
         yield pool
     except KeyboardInterrupt:
+        logging.getLogger("concurrent.futures").addFilter(_no_cancelled_future)
         pool.shutdown(kill_workers=True)
         raise
     _last = _last[0], time.monotonic()
+
+
+def _no_cancelled_future(record: logging.LogRecord) -> bool:
+    """Not the trace of a pool that, stopped, would tell its waiting work so, which has been cancelled before."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], InvalidStateError)
 
 
 def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -> Iterator[Result]:

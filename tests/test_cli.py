@@ -268,3 +268,4 @@ def test_what_is_asked_to_end_stops_as_by_a_key():
     assert (process.returncode, out) == (130, "")
     assert said.splitlines()[-1] == "spindle: stopped; nothing was left half written"
     assert "semlock" not in said
+    assert "Traceback" not in said

@@ -1,9 +1,11 @@
 """One function over many items: what the workers return is what this process would have."""
 
+import logging
 import os
 import subprocess
 import sys
 import time
+from concurrent.futures import Future, InvalidStateError
 from functools import partial
 
 import cloudpickle
@@ -205,3 +207,17 @@ def test_what_is_begun_meanwhile_is_there_when_it_is_asked_for():
     with parallel.meanwhile(os.getpid, 2) as there, parallel.meanwhile(os.getpid, 1) as here:
         assert there() == there() != os.getpid()
         assert here() == os.getpid()
+
+
+def test_a_pool_that_is_stopped_tells_no_trace_of_its_own():
+    """Work that was cancelled before is told to be so once more as a pool is shut down: a trace of that stood before the sentence."""
+    logger = logging.getLogger("concurrent.futures")
+    one = Future()
+    one.cancel()
+    try:
+        one.set_exception(ValueError())
+    except InvalidStateError:
+        record = logger.makeRecord(logger.name, logging.CRITICAL, "", 0, "Exception in executor manager thread:", (), sys.exc_info())
+    assert not parallel._no_cancelled_future(record)
+    assert parallel._no_cancelled_future(logger.makeRecord(logger.name, logging.CRITICAL, "", 0, "else", (), (ValueError, ValueError(), None)))
+    assert parallel._no_cancelled_future(logger.makeRecord(logger.name, logging.CRITICAL, "", 0, "nothing", (), None))
