@@ -103,7 +103,10 @@ class PairState:
         return {b.name: b for b in self.linear if isinstance(b, RollerState)}
 
     def bearing(self, name: str) -> BearingState:
-        """A ball row's state. Raises `BadInput` naming those there are."""
+        """A ball row's state. Raises `BadInput` naming those there are, and `any_bearing` for what is no ball row."""
+        if any(b.name == name for b in self.linear):
+            kind = "a roller row" if name in self.rollers else "given by numbers"
+            raise BadInput(f"bearing {name!r} is {kind}, no ball row; any_bearing({name!r}) has its state")
         return named(name, self.bearings, "ball bearing")
 
 

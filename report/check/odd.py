@@ -35,6 +35,8 @@ ENDLESS = 0.1
 """m, of a motion at resonance that damping does not bound in earnest."""
 LEAST_EXPANSION = 0.01
 """um/m K: glass ceramics such as Zerodur have 0.02, and whoever writes 1/K has 1e-5."""
+LEAST_MODULUS = 0.5e9
+"""Pa: plastics have 1 to 4 GPa, and whoever writes 0.21 has it in units of 1000 GPa."""
 LEAST_DENSITY = 100.0
 """kg/m3: foams have more, and whoever writes g/cm3 has 1 to 20."""
 DENSEST = 22600.0
@@ -43,6 +45,10 @@ OFF = 1.0 * MM
 """How far from its body's surface a point may lie: sensors have bases."""
 COARSE = 2e-3
 """Of a frequency, by which masses at nodes may put it off: more than measured ones are known to."""
+VAST = 3.0
+"""Times the machine's length, beyond which no mass of it lies."""
+SLOW = 2.0
+"""Hz, of a machine as a whole that stands on rubber feet: 3 to 10."""
 FAR = 3.0
 """Radii of gyration from a centre of mass beyond which a body given by its mass is taken to have ended: a rod ends at 1.7."""
 MANY_STEPS = 1e6
@@ -71,6 +77,9 @@ def _materials(found: Looked) -> Iterator[str]:
         expansion = max(m.thermal_expansion.value) / 1e-6
         if expansion < LEAST_EXPANSION:
             yield f"material {m.name}: expands by {expansion:.2g} um/m in a kelvin, and even glass ceramics by 0.02; the key takes micrometres per metre and kelvin, of steel 11.5"
+        modulus = max(m.youngs_modulus.value)
+        if modulus < LEAST_MODULUS:
+            yield f"material {m.name}: has a Young's modulus of {modulus / 1e9:g} GPa, less than any solid part; of steel it is 208"
         if m.density < LEAST_DENSITY:
             yield f"material {m.name}: has {m.density:g} kg/m3, less than any solid part; of steel it is 7800"
 
@@ -88,6 +97,28 @@ def _compact(found: Looked) -> Iterator[str]:
                 f"body {b.name!r}: {b.mass:.4g} kg with moments of inertia of at most {largest:.3g} kg m2 would be a ball of {density:.2g} kg/m3 at the least, and no metal has more than {DENSEST:.3g}: "
                 "a mass in g, or a moment of inertia in another unit than its key's?"
             )
+
+
+def _vast(found: Looked) -> Iterator[str]:
+    """Bodies given by numbers whose mass would have to reach far beyond the machine."""
+    spindle, structure = found.spindle, found.spindle.structure
+    heights = [z for spans in turning_parts(spindle).values() for span in spans for z in span] + [b.z for b in structure.bodies] + [p.position[2] for p in spindle.points]
+    heights += [z for g in spindle.regions for z in g.z]
+    reach = max(heights) - min(heights)
+    for b in structure.rigid_bodies:
+        if b.mass and not b.regions and (radius := np.sqrt(max(b.inertia) / b.mass)) > VAST * reach > 0:
+            yield (
+                f"body {b.name!r}: {b.mass:.4g} kg with a moment of inertia of {max(b.inertia):.3g} kg m2 lie {radius:.2g} m from its centre, and the whole machine is {reach:.2g} m long: "
+                "a moment of inertia in another unit than its key's, or a mass in t?"
+            )
+
+
+def _slow(found: Looked) -> Iterator[str]:
+    """Natural frequencies so low that what holds the parts may be in another unit."""
+    for m in found.reference.modes:
+        if LOWEST < m.frequency < min(SLOW, found.spindle.hammer.band[0] / 10):
+            most = max(m.energy, key=lambda name: m.energy[name])
+            yield f"a natural frequency of {m.frequency:.2g} Hz, with {m.energy[most]:.0%} of its strain in {most}: a machine on soft feet has 3 to 10; is a stiffness, a mass or a moment of inertia in another unit than its key's?"
 
 
 def _massless(found: Looked) -> Iterator[str]:
@@ -281,5 +312,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    *OF_BEARINGS, _seats, _materials, _compact, _massless, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _planes, _effects,
+    *OF_BEARINGS, _seats, _materials, _compact, _vast, _slow, _massless, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _planes, _effects,
 )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,9 @@ ODD = [
     ("hdd", "preload_N = 16.0", "preload_N = 900.0", "under preload and the loads told; balls leave dents from 4200 MPa, the static limit of ISO 76"),
     ("machine-tool", 'sprung_bearings = ["rear1", "rear2"]', 'sprung_bearings = ["rear1"]', "rear2 is loaded the same way as rear1, and only the latter on the spring"),
     ("hdd", "reference_temperature_C = 20.0", "axial_load_N = 60.0\nreference_temperature_C = 20.0", "carries nothing at the reference temperature, at rest"),
+    ("hdd", "youngs_modulus_GPa = 208.0", "youngs_modulus_GPa = 0.208", "material steel: has a Young's modulus of 0.208 GPa"),
+    ("five_bearing", "axial_stiffness_N_per_m = 1.0e9", "axial_stiffness_N_per_m = 1.0e3", "Hz, with 100% of its strain in mount: a machine on soft feet has 3 to 10"),
+    ("rotor", "tilt_inertia_kg_m2 = [6.0e-3, 6.0e-3]", "tilt_inertia_kg_m2 = [7300.0, 7300.0]", "kg m2 lie 49 m from its centre, and the whole machine is 0.6 m long"),
     ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
     ("rotor", "unbalance_z_mm = 225.0", "unbalance_z_mm = 925.0", "imperfections.unbalance_z_mm = 925: lies beyond 'shaft', on which it acts, which spans 0 to 600"),
     ("rotor", "unbalance_z_mm = 225.0", 'unbalance_z_mm = 385.0\nunbalance_body = "disc"', "unbalance_z_mm = 385: lies beyond 'disc', on which it acts, whose centre of mass is at 225"),
@@ -85,6 +89,15 @@ def test_an_angle_that_is_none_is_told_as_the_file_has_it(tmp_path: Path) -> Non
     point = operating_point(spindle, Condition(20.0))
     assert np.degrees(spindle.bearings[0].contact_angle) > 6.0
     assert any("free_contact_angle_deg = 2.5, of lower, upper: angular contact" in words for words in odd(looked(spindle, point)))
+
+
+@pytest.mark.parametrize(("clearance", "told"), [(-3e-6, False), (40e-6, False), (-30e-6, True), (-0.3e-3, True), (0.4e-3, True)])
+def test_a_clearance_of_another_order_is_odd(clearance: float, told: bool) -> None:
+    """Rollers of a pitch diameter of 140 mm that were mounted with ten times the preload that such rows take."""
+    spindle = load(ROOT / "scenes" / "tailstock")
+    tight = replace(spindle, roller_bearings=tuple(replace(b, clearance=clearance, pitch_diameter=0.14) for b in spindle.roller_bearings))
+    found = looked(spindle, operating_point(spindle, Condition(20.0)))
+    assert any("of its pitch diameter; mounted rollers have" in words for words in odd(replace(found, spindle=tight))) == told
 
 
 def test_a_spring_that_nothing_holds_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

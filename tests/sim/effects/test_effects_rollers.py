@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, LinearBearing
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
@@ -56,6 +57,11 @@ def test_seats_that_rub_damp_rollers_as_they_do_balls(tail):
     for old, new in ((plain.rollers["front1"], loose.rollers["front1"]), (plain.bearings[0], loose.bearings[0])):
         assert new.damping == pytest.approx((0.75 + 0.25 * 3) * old.damping)
         assert np.array_equal(new.stiffness, old.stiffness)
+
+
+def test_a_roller_row_asked_for_as_a_ball_row_is_told_as_what_it_is(tail):
+    with pytest.raises(BadInput, match=r"bearing 'front1' is a roller row, no ball row; any_bearing\('front1'\) has its state"):
+        operating_point(tail, Condition(20.0)).state.bearing("front1")
 
 
 def test_grease_damps_rollers_as_it_does_balls(tail):
