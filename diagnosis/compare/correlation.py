@@ -32,6 +32,8 @@ from thermospindle.sim.campaign.beside import Beside
 SILENT = 1e-6  # of the largest FRF of the test; smaller computed ones are forbidden by symmetry and have no shape to compare
 FEWEST = 8  # lines of a band that is worth a number
 LOUDER, NEARLY = 3.0, 0.25  # dB, from which a factor that all FRFs share is told; within which, or within this part of it, they share it
+CERTAIN = 3.0  # times the median second difference of its lines, 2.4 times their noise, by which an FRF stands clear of noise
+OFF, CLEAR, FEWEST_SENSORS = 0.06, 2.5, 2  # ln, and times the scatter of all else, by which FRFs of one sensor stand off from those of so many others: calibrations are known to 2 or 3 %
 SHIFT_STEP = 5e-4  # relative, between the shifts tried
 DISTINCT = 0.05  # by how much FDAC must vary over the shifts tried for one of them to be the best
 THIRD = 10**0.1  # ratio of neighbouring third-octave band centres
@@ -154,6 +156,36 @@ def correlate(beside: Beside) -> Correlation | None:
     every = [b for low, high in parts if (b := band(low, high, high == parts[-1][1])) is not None]
     whole = band(float(frequency[0]), float(frequency[-1]), True)
     return Correlation(beside, computed, csac, csf, whole or _nothing(frequency), tuple(every))
+
+
+def of_sensors(tests: Sequence[Correlation]) -> dict[int, Array]:
+    """By response node, in ln, by how much measured FRFs are larger than computed ones: the median over the louder half of the lines of each FRF that the model answers, in any test,
+    as far as they stand clear of what they scatter by from line to line: noise makes small ones larger."""
+    found: dict[int, list[float]] = {}
+    for c in tests:
+        for (response, reference), (i, j) in c.pairs.items():
+            measured, computed = np.abs(c.measured[i, j]), np.abs(c.computed[i, j])
+            noise = np.median(np.abs(np.diff(c.measured[i, j], n=2))) if measured.size > 2 else 0.0
+            loud = (computed >= np.median(computed)) & (measured > CERTAIN * noise)
+            if c.responds((response, reference)) and loud.any():
+                found.setdefault(response, []).append(float(np.median(np.log(measured[loud] / computed[loud]))))
+    return {node: np.array(ratios) for node, ratios in found.items()}
+
+
+def off_alone(tests: Sequence[Correlation]) -> dict[int, tuple[float, float]]:
+    """Response nodes of which all FRFs are larger or smaller than computed by a factor, and by how much (relative) those of all others are at most: that stand off from the others
+    by `OFF` and by `CLEAR` times as far as all else differs. A shape (MAC), COMAC and FRAC are blind to a factor of a sensor."""
+    every = of_sensors(tests)
+    whole = {node: float(np.median(ratios)) for node, ratios in every.items()}
+    found = {}
+    for node, own in whole.items():
+        others = np.array([ratio for other, ratio in whole.items() if other != node])
+        if len(others) >= FEWEST_SENSORS:
+            middle = float(np.median(others))
+            scatter = max(np.abs(others - middle).max(), np.abs(every[node] - own).max())
+            if abs(own - middle) > max(OFF, CLEAR * scatter):
+                found[node] = float(np.expm1(own - middle)), float(np.expm1(np.abs(others - middle).max()))
+    return found
 
 
 def in_common(tests: Sequence[Correlation]) -> float | None:

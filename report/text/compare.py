@@ -11,7 +11,7 @@ from rich.console import Console
 from thermospindle.diagnosis.compare.before_after import BeforeAfter
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
 from thermospindle.diagnosis.compare.constant import constant_errors
-from thermospindle.diagnosis.compare.correlation import Band
+from thermospindle.diagnosis.compare.correlation import Band, of_sensors
 from thermospindle.diagnosis.data.observe import FREQUENCY_FLOOR
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE
 from thermospindle.model.errors import listed
@@ -27,6 +27,7 @@ def comparison_json(c: Comparison) -> dict[str, Any]:
         "spindle": c.spindle,
         "campaign": c.campaign,
         "tests": [_test_json(t) for t in c.tests],
+        "measured_over_computed": {str(node): float(np.exp(np.median(ratios))) for node, ratios in of_sensors([t.correlation for t in c.tests if t.correlation]).items()},
         "comac": {str(node): value for node, value in c.comac.items()},
         "crossings": list(c.crossings),
         "rms_pull": known(c.rms_residual),
@@ -220,6 +221,7 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
     if any(t.correlation for t in c.tests):
         _show_frfs(console, c)
     if c.comac or any(t.frac for t in c.tests):
+        scales = of_sensors([t.correlation for t in c.tests if t.correlation])
         references = sorted({reference for t in c.tests for _, reference in t.frac})
         rows = []
         for node in dict.fromkeys([*c.comac, *(response for t in c.tests for response, _ in t.frac)]):
@@ -227,9 +229,10 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
             for r in references:
                 found = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
                 cells.append(f"{min(found):.3f}" if found else "-")
-            rows.append([str(node), "-" if comac is None else f"{comac:.4f}", *cells])
-        title = "COMAC, and smallest FRAC of all tests by hammer point"
-        show_grid(console, title, ("node", "COMAC", *(f"hammer {r}" for r in references)), rows)
+            scale = f"{np.exp(np.median(scales[node])):.3f}" if node in scales else "-"
+            rows.append([str(node), "-" if comac is None else f"{comac:.4f}", scale, *cells])
+        title = "COMAC, size of FRFs, and smallest FRAC of all tests by hammer point"
+        show_grid(console, title, ("node", "COMAC", "measured /\ncomputed", *(f"hammer {r}" for r in references)), rows)
 
 
 def _show_modes(console: Console, c: Comparison) -> None:

@@ -11,7 +11,7 @@ from rich.console import Console
 from thermospindle.diagnosis.compare.before_after import BeforeAfter, errors, held_out
 from thermospindle.diagnosis.compare.compare import Comparison
 from thermospindle.diagnosis.compare.compare import compare as beside
-from thermospindle.diagnosis.compare.correlation import in_common
+from thermospindle.diagnosis.compare.correlation import in_common, off_alone
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.runout.compare import RunoutBeside, compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import modal_tests
@@ -67,7 +67,7 @@ def compare(
             turning[1](console)
 
     write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ()), name=whole.name, both=both if earlier else None))
-    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *_beyond(comparison), *(likenesses(spindle, whole) or _louder(comparison))])
+    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *_beyond(comparison), *(likenesses(spindle, whole) or [*_louder(comparison), *_alone(comparison, whole)])])
 
 
 def _beyond(c: Comparison) -> list[str]:
@@ -87,6 +87,16 @@ def _louder(c: Comparison) -> list[str]:
         return []
     size = f"{abs(by):.0f} dB {'larger' if by > 0 else 'smaller'} than computed ones"
     return [f"measured FRFs are {size}, all alike: a unit, a sensor's or the hammer's sensitivity, or the mass of the drawing is off by a factor of about {10 ** (abs(by) / 20):.2g}"]
+
+
+def _alone(c: Comparison, campaign: Campaign) -> list[str]:
+    """Sensors whose FRFs are larger or smaller than computed, where those of the others are not: no likeness of shapes tells of it."""
+    names = {p.node: f"{p.node} ({p.name})" for p in campaign.points}
+    return [
+        f"FRFs measured at point {names[node]} are {abs(off):.0%} {'larger' if off > 0 else 'smaller'} than computed, beside those of the other points, which differ by {others:.0%} at most: "
+        "is that its sensor's sensitivity?"
+        for node, (off, others) in off_alone([t.correlation for t in c.tests if t.correlation]).items()
+    ]
 
 
 def _write(*what: Any, name: str, both: BeforeAfter | None = None) -> None:
