@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from thermospindle.model.bearing import ball_row, roller
+from thermospindle.model.bearing.ball_row import BallRow
 from thermospindle.model.bearing.definitions import BearingSet
 from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
 from thermospindle.model.bearing.roller import RollerState
@@ -22,7 +23,7 @@ from thermospindle.model.carrier import load_carrier
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, rotor_base
-from thermospindle.model.rotor.static import displacement
+from thermospindle.model.rotor.static import displacement, firmly
 from thermospindle.model.types import Array
 
 SMALL = 1e-9
@@ -34,14 +35,13 @@ SLACK = 1.0
 
 @dataclass(frozen=True)
 class _Row:
-    """A row in the structure: `b` (5, n) as above; `force`, `tangent`, `energy` of its displacement, the last without ball inertia."""
+    """A row in the structure: `b` (5, n) as above; force and tangent of its displacement, these `light` without ball inertia, and so its `energy`."""
 
     name: str
     b: Array
-    force: Callable[[Array], Array]
-    tangent: Callable[[Array], Array]
+    answer: Callable[[Array], tuple[Array, Array]]
+    light: Callable[[Array], tuple[Array, Array]]
     energy: Callable[[Array], float]
-    light: Callable[[Array], tuple[Array, Array]]  # force and tangent without ball inertia
 
 
 def loaded(spindle: Spindle, state: PairState) -> PairState:
@@ -82,26 +82,22 @@ def _rings_apart(spindle: Spindle) -> Spindle:
 def _ball(chain: RotorBase, b: BearingState) -> _Row:
     light = replace(b.row, inertia=None)
 
-    def alone(q: Array) -> tuple[Array, Array]:
-        answer = ball_row.respond(light, q)
-        return answer.force, answer.tangent
+    def of(row: BallRow) -> Callable[[Array], tuple[Array, Array]]:
+        def answer(q: Array) -> tuple[Array, Array]:
+            found = ball_row.respond(row, q)
+            return found.force, found.tangent
 
-    return _Row(
-        b.name,
-        _rows(chain, b.name),
-        lambda q: ball_row.respond(b.row, q).force,
-        lambda q: ball_row.respond(b.row, q).tangent,
-        lambda q: ball_row.energy(light, q),
-        alone,
-    )
+        return answer
+
+    return _Row(b.name, _rows(chain, b.name), of(b.row), of(light), lambda q: ball_row.energy(light, q))
 
 
 def _roller(chain: RotorBase, b: RollerState) -> _Row:
-    def alone(q: Array) -> tuple[Array, Array]:
-        answer = roller.respond(b.row, q)
-        return answer.force, answer.tangent
+    def answer(q: Array) -> tuple[Array, Array]:
+        found = roller.respond(b.row, q)
+        return found.force, found.tangent
 
-    return _Row(b.name, _rows(chain, b.name), lambda q: alone(q)[0], lambda q: alone(q)[1], lambda q: roller.energy(b.row, q), alone)
+    return _Row(b.name, _rows(chain, b.name), answer, answer, lambda q: roller.energy(b.row, q))
 
 
 def _rows(chain: RotorBase, name: str) -> Array:
@@ -109,42 +105,48 @@ def _rows(chain: RotorBase, name: str) -> Array:
 
 
 def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, size: float) -> Array:
-    """Motion (n,) under a load (n,) of `size` N: the least potential, then Newton's method on the balance."""
+    """Motion (n,) under a load (n,) of `size` N: the least potential, then Newton's method on the balance.
+
+    With any stiffness of the rows added to K, the balance has the load and forces along the rows alone at its right: u lies in the span of what these do to that structure, and all is
+    sought there, in some thirty unknowns whatever the number of elements (the dual of substructuring: Farhat & Roux 1991, *Int. J. Numer. Meth. Eng.* 32, 1205).
+    """
     firm = stiffness + sum((row.b.T @ (np.trace(stiffness) / len(mass) * row.b) for row in rows), start=np.zeros_like(stiffness))
-    if displacement(firm, load) is None:
+    held = firmly(firm, load)
+    if held is None:
         raise NoEquilibrium("nothing bears the radial load: the spindle is free to move under it")
+    unit = 1e-6 * np.sqrt(np.median(mass) / mass)
+    pushed = np.linalg.solve(held, np.column_stack([load, *(row.b.T for row in rows)])) / unit[:, None]
+    basis = unit[:, None] * np.linalg.qr(pushed / np.maximum(np.linalg.norm(pushed, axis=0), 1e-300))[0]
+    small, force, moves = basis.T @ stiffness @ basis, basis.T @ load, [row.b @ basis for row in rows]
     none = np.zeros(5)
     resting = [row.light(none)[0] for row in rows]
-    unit = 1e-6 * np.sqrt(np.median(mass) / mass)
     work = 1e-6 * size
 
     def potential(v: Array) -> float:
-        u = v * unit
-        held = sum(row.energy(row.b @ u) - float(f @ (row.b @ u)) for row, f in zip(rows, resting, strict=True))
-        return (0.5 * float(u @ stiffness @ u) + held - float(load @ u)) / work
+        held = sum(row.energy(b @ v) - float(f @ (b @ v)) for row, b, f in zip(rows, moves, resting, strict=True))
+        return (0.5 * float(v @ small @ v) + held - float(force @ v)) / work
 
     def gradient(v: Array) -> Array:
-        u = v * unit
-        held = sum((row.b.T @ (row.light(row.b @ u)[0] - f) for row, f in zip(rows, resting, strict=True)), start=np.zeros_like(u))
-        return np.asarray(stiffness @ u + held - load) * unit / work
+        held = sum((b.T @ (row.light(b @ v)[0] - f) for row, b, f in zip(rows, moves, resting, strict=True)), start=np.zeros_like(v))
+        return np.asarray(small @ v + held - force) / work
 
     def hessian(v: Array) -> Array:
-        u = v * unit
-        held = sum((row.b.T @ row.light(row.b @ u)[1] @ row.b for row in rows), start=np.zeros_like(stiffness))
-        return (stiffness + held) * np.outer(unit, unit) / work + 1e-12 * np.eye(len(u))
+        held = sum((b.T @ row.light(b @ v)[1] @ b for row, b in zip(rows, moves, strict=True)), start=np.zeros_like(small))
+        return (small + held) / work + 1e-12 * np.eye(len(v))
 
-    found = scipy.optimize.minimize(potential, np.zeros(len(load)), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-7, "maxiter": 400})
-    u = found.x * unit
-    before = [row.force(none) for row in rows]
+    found = scipy.optimize.minimize(potential, np.zeros(len(force)), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-7, "maxiter": 400})
+    v = found.x
+    before = [row.answer(none)[0] for row in rows]
     for _ in range(MOST_STEPS):
-        left = load - stiffness @ u - sum((row.b.T @ (row.force(row.b @ u) - f) for row, f in zip(rows, before, strict=True)), start=np.zeros_like(u))
-        tangent = stiffness + sum((row.b.T @ _even(row.tangent(row.b @ u)) @ row.b for row in rows), start=np.zeros_like(stiffness))
+        answers = [row.answer(b @ v) for row, b in zip(rows, moves, strict=True)]
+        left = force - small @ v - sum((b.T @ (f - at_rest) for b, (f, _), at_rest in zip(moves, answers, before, strict=True)), start=np.zeros_like(v))
+        tangent = small + sum((b.T @ _even(k) @ b for b, (_, k) in zip(moves, answers, strict=True)), start=np.zeros_like(small))
         step = displacement(tangent, left)
         if step is None:
             break
-        u = u + step
-        if np.abs(step).max() <= SMALL * np.abs(u).max():
-            return np.asarray(u)
+        v = v + step
+        if np.abs(basis @ step).max() <= SMALL * np.abs(basis @ v).max():
+            return np.asarray(basis @ v)
     raise NoEquilibrium(f"the bearings find no balance under a radial load of {size:g} N")
 
 

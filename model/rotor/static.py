@@ -95,11 +95,16 @@ def free_motions(stiffness: Array) -> Array:
 
 def displacement(stiffness: Array, force: Array) -> Array | None:
     """Displacement (n,) under a force (n,); None where the force drives a motion that nothing resists."""
+    held = firmly(stiffness, force)
+    return None if held is None else np.asarray(np.linalg.solve(held, force))
+
+
+def firmly(stiffness: Array, force: Array) -> Array | None:
+    """The stiffness (n, n) with what nothing resists held, which the force (n,) does not drive; None where it does."""
     free = free_motions(stiffness)
     if free.size and np.linalg.norm(free.T @ force) > 1e-6 * np.linalg.norm(force):
         return None
-    held = stiffness + np.trace(stiffness) / len(stiffness) * free @ free.T
-    return np.asarray(np.linalg.solve(held, force))
+    return np.asarray(stiffness + np.trace(stiffness) / len(stiffness) * free @ free.T)
 
 
 def rated(spindle: Spindle) -> bool:
