@@ -105,7 +105,7 @@ def _rows(chain: RotorBase, name: str) -> Array:
 
 
 def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, size: float) -> Array:
-    """Motion (n,) under a load (n,) of `size` N: the least potential, then Newton's method on the balance.
+    """Motion (n,) under a load (n,) of `size` N: Newton's method on the balance without ball inertia, or the least potential where that does not arrive, then with it.
 
     With any stiffness of the rows added to K, the balance has the load and forces along the rows alone at its right: u lies in the span of what these do to that structure, and all is
     sought there, in some thirty unknowns whatever the number of elements (the dual of substructuring: Farhat & Roux 1991, *Int. J. Numer. Meth. Eng.* 32, 1205).
@@ -117,37 +117,60 @@ def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, si
     unit = 1e-6 * np.sqrt(np.median(mass) / mass)
     pushed = np.linalg.solve(held, np.column_stack([load, *(row.b.T for row in rows)])) / unit[:, None]
     basis = unit[:, None] * np.linalg.qr(pushed / np.maximum(np.linalg.norm(pushed, axis=0), 1e-300))[0]
-    small, force, moves = basis.T @ stiffness @ basis, basis.T @ load, [row.b @ basis for row in rows]
-    none = np.zeros(5)
-    resting = [row.light(none)[0] for row in rows]
-    work = 1e-6 * size
+    structure = _Structure(basis.T @ stiffness @ basis, basis.T @ load, tuple(row.b @ basis for row in rows), basis)
+    start = _balanced(structure, [row.light for row in rows], np.zeros(len(structure.load)))  # convex: where it arrives is the one answer
+    if start is None:
+        start = _least(structure, rows, 1e-6 * size)
+    found = _balanced(structure, [row.answer for row in rows], start)
+    if found is None:
+        raise NoEquilibrium(f"the bearings find no balance under a radial load of {size:g} N")
+    return np.asarray(basis @ found)
+
+
+@dataclass(frozen=True)
+class _Structure:
+    """Stiffness (m, m), load (m,) and every row's motion (5, m) in the unknowns v (m,) of u = `basis` (n, m) v."""
+
+    stiffness: Array
+    load: Array
+    rows: tuple[Array, ...]
+    basis: Array
+
+
+def _balanced(s: _Structure, answers: Sequence[Callable[[Array], tuple[Array, Array]]], v: Array) -> Array | None:
+    """The balance by Newton's method from v (m,); None where it does not arrive."""
+    at_rest = [answer(np.zeros(5))[0] for answer in answers]
+    for _ in range(MOST_STEPS):
+        found = [answer(b @ v) for answer, b in zip(answers, s.rows, strict=True)]
+        left = s.load - s.stiffness @ v - sum((b.T @ (f - f0) for b, (f, _), f0 in zip(s.rows, found, at_rest, strict=True)), start=np.zeros_like(v))
+        tangent = s.stiffness + sum((b.T @ _even(k) @ b for b, (_, k) in zip(s.rows, found, strict=True)), start=np.zeros_like(s.stiffness))
+        step = displacement(tangent, left)
+        if step is None or not np.isfinite(step).all():
+            return None
+        v = v + step
+        if np.abs(s.basis @ step).max() <= SMALL * np.abs(s.basis @ v).max():
+            return v
+    return None
+
+
+def _least(s: _Structure, rows: Sequence[_Row], work: float) -> Array:
+    """Where the potential without ball inertia is least, in units of a `work` (J): rows that lose contact on the way are no hindrance."""
+    resting = [row.light(np.zeros(5))[0] for row in rows]
 
     def potential(v: Array) -> float:
-        held = sum(row.energy(b @ v) - float(f @ (b @ v)) for row, b, f in zip(rows, moves, resting, strict=True))
-        return (0.5 * float(v @ small @ v) + held - float(force @ v)) / work
+        held = sum(row.energy(b @ v) - float(f @ (b @ v)) for row, b, f in zip(rows, s.rows, resting, strict=True))
+        return (0.5 * float(v @ s.stiffness @ v) + held - float(s.load @ v)) / work
 
     def gradient(v: Array) -> Array:
-        held = sum((b.T @ (row.light(b @ v)[0] - f) for row, b, f in zip(rows, moves, resting, strict=True)), start=np.zeros_like(v))
-        return np.asarray(small @ v + held - force) / work
+        held = sum((b.T @ (row.light(b @ v)[0] - f) for row, b, f in zip(rows, s.rows, resting, strict=True)), start=np.zeros_like(v))
+        return np.asarray(s.stiffness @ v + held - s.load) / work
 
     def hessian(v: Array) -> Array:
-        held = sum((b.T @ row.light(b @ v)[1] @ b for row, b in zip(rows, moves, strict=True)), start=np.zeros_like(small))
-        return (small + held) / work + 1e-12 * np.eye(len(v))
+        held = sum((b.T @ row.light(b @ v)[1] @ b for row, b in zip(rows, s.rows, strict=True)), start=np.zeros_like(s.stiffness))
+        return (s.stiffness + held) / work + 1e-12 * np.eye(len(v))
 
-    found = scipy.optimize.minimize(potential, np.zeros(len(force)), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-7, "maxiter": 400})
-    v = found.x
-    before = [row.answer(none)[0] for row in rows]
-    for _ in range(MOST_STEPS):
-        answers = [row.answer(b @ v) for row, b in zip(rows, moves, strict=True)]
-        left = force - small @ v - sum((b.T @ (f - at_rest) for b, (f, _), at_rest in zip(moves, answers, before, strict=True)), start=np.zeros_like(v))
-        tangent = small + sum((b.T @ _even(k) @ b for b, (_, k) in zip(moves, answers, strict=True)), start=np.zeros_like(small))
-        step = displacement(tangent, left)
-        if step is None:
-            break
-        v = v + step
-        if np.abs(basis @ step).max() <= SMALL * np.abs(basis @ v).max():
-            return np.asarray(basis @ v)
-    raise NoEquilibrium(f"the bearings find no balance under a radial load of {size:g} N")
+    found = scipy.optimize.minimize(potential, np.zeros(len(s.load)), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-7, "maxiter": 400})
+    return np.asarray(found.x)
 
 
 def _even(tangent: Array) -> Array:

@@ -76,7 +76,7 @@ def test_a_bearing_under_a_radial_load_is_told_along_x_and_along_y(table, tmp_pa
     assert main(["table", str(folder), "--temperatures", "20"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert f"radial stiffness along x {slopes[0][0] / 1e6:.2f} N/um, along y {slopes[1][1] / 1e6:.2f} N/um" in said
-    assert "k_yy" in said
+    assert "radial y" in said
     assert read_table(tmp_path / "out" / "table.csv").values["front1"]["radial_stiffness_y_N_per_m"][0, 0] == told["radial_stiffness_y_N_per_m"]
     stiffness = np.reshape(Numbers(table="table.csv", bearing="front1", damping_ratio=0.0).grid(tmp_path / "out" / "spindle.toml", "table")[2], (5, 5))
     assert stiffness[:2, :2] == pytest.approx(state.stiffness[:2, :2], rel=1e-12)
