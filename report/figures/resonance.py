@@ -14,7 +14,7 @@ from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import INK, PALE, STYLE, spread
 from thermospindle.report.figures.warmup import LETTERS, MODES, name_ends
-from thermospindle.sim.resonance.found import ALIKE, Coincidence, LineTrack, ResonanceMap, Track, strongest
+from thermospindle.sim.resonance.found import ALIKE, Coincidence, LineTrack, ResonanceMap, Track, nearest, strongest
 from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.probes import looked_at
 
@@ -30,7 +30,7 @@ CAUSES = {
 }
 SIZE = (9.6, 6.2)  # inches
 LINES = 9  # drawn in a diagram
-MARKED = 6  # coincidences along an axis of the runout
+MARKED = 6  # coincidences along an axis of the runout, and the nearest
 CURVES = 14  # drawn in the map
 
 
@@ -176,7 +176,7 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = Fal
 
 
 def runout(found: ResonanceMap) -> Figure:
-    """Nonrepeatable runout of the linear response along temperature and along speed, with the coincidences passed on the way; not at rest, where there is none, for it does not grow from 0."""
+    """Nonrepeatable runout of the linear response along temperature and along speed, with the strongest coincidences passed on the way and the one nearest to the nominal condition; not at rest, where there is none, for it does not grow from 0."""
     t_nominal, n_nominal = found.nominal.temperature, found.nominal.speed / RPM
     at_speed = [c for c in found.coincidences if c.at_nominal_speed]
     at_temperature = [c for c in found.coincidences if abs(c.condition.temperature - t_nominal) < ALIKE]
@@ -190,8 +190,9 @@ def runout(found: ResonanceMap) -> Figure:
     for axes, (along, unit, crossed, place, label) in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         x, values = unit * along[:, 0], along[:, 1:]
         for series, name, paint in zip(values.T, names, paints, strict=True):
-            axes.plot(x, 1e9 * series, color=paint, marker=".", ms=4, lw=1.0, label=f"{name}, dots: computed")
-        marked = [c for c in strongest(crossed) if not c.repeats][:MARKED]
+            axes.plot(x, 1e9 * series, color=paint, marker=".", ms=3, lw=1.0, label=f"{name}, dots: computed")
+        every = [c for c in strongest(crossed) if not c.repeats]
+        marked = [*every[:MARKED], *(c for c in every[MARKED:] if c is nearest(found.coincidences))]
         for c in marked:
             axes.axvline(place(c), color=PALE, lw=0.8, ls=":")
             axes.plot(place(c), 1e9 * c.nrro, "o", mfc="none", mec=paints[names.index(c.line.direction)], ms=8, mew=1.2, clip_on=False)

@@ -17,6 +17,7 @@ from thermospindle.report.figures.common import STYLE
 from thermospindle.report.figures.resonance import CAUSES, both, campbell, figures, over_temperature, runout
 from thermospindle.report.figures.warmup import MODES
 from thermospindle.report.text.resonance import map_section, told
+from thermospindle.sim.resonance.found import nearest
 from thermospindle.sim.resonance.map import resonance_map
 
 
@@ -128,3 +129,25 @@ def test_runout_over_speed_begins_where_the_spindle_turns(found):
     assert found.nrro_speed[0].tolist() == [0.0, 0.0, 0.0]
     drawn = figures(found)["nrro"].axes[1].lines[0].get_xydata()
     assert drawn[0] == pytest.approx(found.nrro_speed[1, :2] * [1 / RPM, 1e9])
+
+
+def test_every_coincidence_of_the_table_is_a_point_of_the_runout_curve(found, met):
+    """Between places of the grid the curve passed 21 nm where the table said 35.8 nm: only the six strongest were among its places."""
+    for of in (found, met):
+        along_speed = [c for c in of.coincidences if not c.repeats and c.condition.temperature == NOMINAL.temperature]
+        along_temperature = [c for c in of.coincidences if not c.repeats and c.at_nominal_speed]
+        for curve, listed in ((of.nrro_speed, [(c, c.condition.speed) for c in along_speed]), (of.nrro_temperature, [(c, c.condition.temperature) for c in along_temperature])):
+            for c, place in listed:
+                [row] = curve[curve[:, 0] == place]
+                assert row[2 if c.line.direction == "axial" else 1] == pytest.approx(c.nrro, rel=1e-9)
+    assert len(along_temperature) >= 1
+    assert len([c for c in found.coincidences if c.condition.temperature == NOMINAL.temperature]) > 20
+
+
+def test_runout_rings_the_coincidence_nearest_to_the_nominal_condition(found):
+    """It is the one that the first sentence names, however weak."""
+    c = nearest(found.coincidences)
+    right = runout(found).axes[-1]
+    rings = [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in right.lines if line.get_marker() == "o"]
+    assert c.condition.temperature == NOMINAL.temperature
+    assert (pytest.approx(c.condition.speed / RPM), pytest.approx(1e9 * c.nrro)) in rings
