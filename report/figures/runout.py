@@ -167,7 +167,7 @@ def _large(every: Sequence[FoundLine]) -> list[FoundLine]:
 
 
 def waterfall_figure(spectra: Sequence[LineSpectrum], direction: str, size: tuple[float, float]) -> Figure:
-    """Spectra over frequency, one above the other in rpm, each rising by its level above `RANGE` dB below the strongest line of all;
+    """Spectra over frequency, one above the other in rpm, each rising by its level above `RANGE` dB below the strongest line of all, which the title tells;
     dots are natural frequencies."""
     highest = 500 * np.ceil(max(float(s.frequency.max(initial=1.0)) for s in spectra) / 500)
     grid = np.linspace(0, highest, 1201)
@@ -184,6 +184,8 @@ def waterfall_figure(spectra: Sequence[LineSpectrum], direction: str, size: tupl
             natural = spectra[k].natural[spectra[k].natural < highest]
             axes.plot(natural, np.full(len(natural), speeds[k]), ".", color=INK, ms=2.5)
         axes.set(xlabel="frequency, Hz", ylabel="speed, rpm", xlim=(0, highest))
+        title = f"A line at its speed: {RANGE:g} dB below the strongest of all, {TO_NM * amplitude.max():.3g} nm zero to peak.\nPeaks rise above it on a scale of dB. Dots: natural frequencies"
+        axes.set_title(title, fontsize=7.5, fontweight="normal")
         axes.grid(visible=False)
     return figure
 
