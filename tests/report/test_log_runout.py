@@ -24,7 +24,17 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM, TO_MM
-from thermospindle.report.figures.runout import LEAST, LINE, RANGE, _polar, line_label, motion_figure, polar_figure, spectrum_figure, waterfall_figure
+from thermospindle.report.figures.runout import (
+    LEAST,
+    LINE,
+    RANGE,
+    _polar,
+    line_label,
+    motion_figure,
+    polar_figure,
+    spectrum_figure,
+    waterfall_figure,
+)
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe
 from thermospindle.report.log.turning.blueprint import blueprint, reach
