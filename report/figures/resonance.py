@@ -84,7 +84,11 @@ def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, floa
     name_ends(axes, np.array(ends), names, paints)
     _name_tops(axes, leaving)
     tracks = {key(t.line) for t in drawn_lines(found)}
-    strength = {(key(c.line), c.mode.number): c.strength for c in strongest(found.coincidences) if key(c.line) in tracks}
+    strength: dict[tuple, float] = {}
+    for c in found.coincidences:
+        if key(c.line) in tracks:
+            pair = key(c.line), c.mode.number
+            strength[pair] = max(c.strength, strength.get(pair, 0.0))
     marked = [
         (s / RPM, float(np.interp(s, found.speeds, curve.mode.frequency[t0])), strength[key(curve.line), curve.mode.number])
         for curve in found.curves

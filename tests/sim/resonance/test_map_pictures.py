@@ -19,7 +19,7 @@ from thermospindle.report.figures.resonance import CAUSES, WHIRL, both, campbell
 from thermospindle.report.figures.warmup import MODES
 from thermospindle.report.text.resonance import map_section, told
 from thermospindle.sim.resonance.found import nearest
-from thermospindle.sim.resonance.map import resonance_map
+from thermospindle.sim.resonance.map import _on_curve, resonance_map
 from thermospindle.sim.resonance.point import key
 
 
@@ -196,3 +196,13 @@ def test_modes_and_causes_differ_in_colour(seen):
 
     for a, b in combinations([*WHIRL.values(), *CAUSES.values()], 2):
         assert np.linalg.norm(lab(a) - lab(b)) > 15, (a, b)
+
+
+def test_an_interpolated_coincidence_has_the_runout_of_the_curve_where_it_passes(met):
+    """On a coarse grid of temperatures its ring stood beside the curve, by a tenth of its value."""
+    c = next(c for c in met.coincidences if c.at_nominal_speed)
+    rough = replace(c, interpolated=True, nrro=1.0)
+    assert _on_curve(rough, met.nrro_speed, met.nrro_temperature, met.nominal).nrro == pytest.approx(c.nrro, rel=1e-9)
+    assert _on_curve(replace(rough, interpolated=False), met.nrro_speed, met.nrro_temperature, met.nominal).nrro == 1.0
+    elsewhere = replace(rough, condition=replace(c.condition, temperature=33.3333))
+    assert _on_curve(elsewhere, met.nrro_speed, met.nrro_temperature, met.nominal).nrro == 1.0
