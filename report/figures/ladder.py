@@ -18,6 +18,8 @@ from thermospindle.report.text.ladder_table import ResidualMap, residual_map
 from thermospindle.report.typeset import signed_short
 
 ERROR, HELD_OUT = "#b3402a", "#2166ac"
+GROUND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+"""Of a number, which no line crosses."""
 BESIDE = 12  # names of steps that fit beside each other
 
 
@@ -48,7 +50,7 @@ def _errors(axes: Axes, found: Ladder) -> None:
                 above = not up
             shift = (0, 7) if above or r.fitted is None else (0, -14)
             axes.annotate(
-                _short(values[x]), (x, values[x]), xytext=shift, textcoords="offset points", ha="center", color=colour, fontsize=8
+                _short(values[x]), (x, values[x]), xytext=shift, textcoords="offset points", ha="center", color=colour, fontsize=8, bbox=GROUND, zorder=4
             )
     axes.axhline(1.0, color=PALE, lw=0.9, ls="--", zorder=1, label="errors of the data")
     logarithmic(axes)

@@ -14,23 +14,25 @@ from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import INK, PALE, STYLE, spread
 from thermospindle.report.figures.warmup import LETTERS, MODES, name_ends
-from thermospindle.sim.resonance.found import ALIKE, Coincidence, LineTrack, ResonanceMap, Track, strongest
+from thermospindle.sim.resonance.found import ALIKE, Coincidence, LineTrack, ResonanceMap, Track, nearest, strongest
 from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.probes import looked_at
 
-WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "mixed": "#7b3f99", "none": "#1f8a70"}
+WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "mixed": PALE, "none": INK}
+"""Colours of modes. They and those of lines differ from each other, also for eyes that do not tell red from green."""
 WHIRLS = {"forward": "whirls forward", "backward": "whirls backward", "mixed": "mixed whirl", "none": "axial or standing"}
 CAUSES = {
-    "unbalance": INK,
-    "inner waviness": "#a0741a",
-    "outer waviness": "#7a3d8f",
-    "ball waviness": "#2e7d6b",
-    "ball size": "#b0457b",
-    "cage unbalance": "#555f6b",
+    "unbalance": "#2aa7c9",
+    "inner waviness": "#c98a00",
+    "outer waviness": "#a0307a",
+    "ball waviness": "#1b7a4b",
+    "ball size": "#3b0a6e",
+    "cage unbalance": "#5c3a1e",
 }
+HEAVY, THIN = 2.2, 0.9  # points, of modes and of lines
 SIZE = (9.6, 6.2)  # inches
-LINES = 9  # drawn in a diagram
-MARKED = 6  # coincidences along an axis of the runout
+LINES = 9  # drawn in a diagram, more where more meet a mode at the nominal speed
+MARKED = 6  # coincidences along an axis of the runout, and the nearest
 CURVES = 14  # drawn in the map
 
 
@@ -42,15 +44,16 @@ def figures(found: ResonanceMap) -> dict[str, Figure]:
 
 
 def drawn_lines(found: ResonanceMap) -> list[LineTrack]:
-    """The lines of the strongest coincidences and the unbalance, one bearing for each."""
+    """The unbalance, the lines that meet modes at the nominal speed and the one nearest to a mode there, and those of the strongest coincidences up to `LINES`; one bearing for each."""
     tracks = {key(t.line): t for t in found.lines}
     chosen: dict[tuple, LineTrack] = {}
-    at_nominal = [c for c in found.coincidences if c.at_nominal_speed]
-    for c in [*strongest(at_nominal), *strongest(found.coincidences)]:
-        if c.line.cause != "unbalance":
+    near = nearest(found.coincidences)
+    always = [*strongest([c for c in found.coincidences if c.at_nominal_speed]), *([near] if near else [])]
+    for c in [*always, *strongest(found.coincidences)]:
+        if c.line.cause != "unbalance" and (c in always or len(chosen) < LINES):
             chosen.setdefault(_kind(c.line), tracks[key(c.line)])
     first = {(t.line.name, t.line.whirl): t for t in found.lines if t.line.cause == "unbalance"}  # static and couple unbalance are one line
-    return list(first.values()) + list(chosen.values())[:LINES]
+    return [*first.values(), *chosen.values()]
 
 
 def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, float] = SIZE) -> Figure:
@@ -68,7 +71,7 @@ def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, floa
     ends, names, paints = [], [], []
     for track in drawn_lines(found):
         values, paint = track.frequency[t0], CAUSES[track.line.cause]
-        axes.plot(speed, values, color=paint, lw=0.9, ls="--" if track.line.whirl < 0 else "-")
+        axes.plot(speed, values, color=paint, lw=THIN, ls="--" if track.line.whirl < 0 else "-")
         if values[-1] > top:
             leaving.append((float(np.interp(top, values, speed)), _named(track.line), paint))
         else:
@@ -81,7 +84,11 @@ def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, floa
     name_ends(axes, np.array(ends), names, paints)
     _name_tops(axes, leaving)
     tracks = {key(t.line) for t in drawn_lines(found)}
-    strength = {(key(c.line), c.mode.number): c.strength for c in strongest(found.coincidences) if key(c.line) in tracks}
+    strength: dict[tuple, float] = {}
+    for c in found.coincidences:
+        if key(c.line) in tracks:
+            pair = key(c.line), c.mode.number
+            strength[pair] = max(c.strength, strength.get(pair, 0.0))
     marked = [
         (s / RPM, float(np.interp(s, found.speeds, curve.mode.frequency[t0])), strength[key(curve.line), curve.mode.number])
         for curve in found.curves
@@ -92,7 +99,8 @@ def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, floa
     axes.axvline(found.nominal.speed / RPM, color=PALE, lw=1.0, ls=":")
     axes.set(xlabel="speed, rpm", ylabel="frequency, Hz")
     figure.suptitle(f"Campbell diagram at {found.temperatures[t0]:.4g} °C", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
-    figure.legend(handles=_key(found, drawn_lines(found), bool(marked)), loc="outside lower center", ncols=int(size[0] / 1.9), fontsize=7.5)
+    handles = [*_key(found, drawn_lines(found), [s for *_, s in marked]), _at_nominal(f"nominal speed, {found.nominal.speed / RPM:g} rpm")]
+    figure.legend(handles=handles, loc="outside lower center", ncols=int(size[0] / 2.3), fontsize=7.5)
     return figure
 
 
@@ -111,7 +119,7 @@ def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, bare
     for mode in found.modes:
         _draw_mode(axes, found.temperatures, mode.frequency[:, s0], mode)
     for t in shown:
-        axes.plot(found.temperatures, t.frequency[:, s0], color=CAUSES[t.line.cause], lw=0.9, ls="--" if t.line.whirl < 0 else "-")
+        axes.plot(found.temperatures, t.frequency[:, s0], color=CAUSES[t.line.cause], lw=THIN, ls="--" if t.line.whirl < 0 else "-")
     named = [(float(m.frequency[-1, s0]), f"mode {m.number} {m.kind}", WHIRL[m.whirl], any(c.mode.number == m.number for c in crossing)) for m in found.modes]
     named += [(float(t.frequency[-1, s0]), f"{_named(t.line)} {t.line.bearing}", CAUSES[t.line.cause], any(key(c.line) == key(t.line) for c in crossing)) for t in shown]
     ends, names, paints, _ = zip(*sorted(named, key=lambda row: not row[-1]), strict=True)  # what meets first: the names that there is room for
@@ -121,7 +129,7 @@ def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, bare
     if not bare:
         title = f"Natural frequencies and the strongest lines among them at {found.nominal.speed / RPM:.0f} rpm"
         figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=9.5)
-        figure.legend(handles=_key(found, shown, bool(crossing)), loc="outside lower center", ncols=6, fontsize=7.5)
+        figure.legend(handles=_key(found, shown, [c.strength for c in crossing]), loc="outside lower center", ncols=int(size[0] / 2.3), fontsize=7.5)
     return figure
 
 
@@ -170,13 +178,13 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = Fal
     if not bare:
         figure.suptitle("Where the strongest lines meet a mode (line, mode number)", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
         handles = [Line2D([], [], color=paints[m.number], label=f"mode {m.number} {m.kind}") for m in found.modes if m.number in paints]
-        handles += [Line2D([], [], color=INK, marker="s", ls="", ms=5, label="nominal"), *[_circle()] * bool(meeting)]
+        handles += [Line2D([], [], color=INK, marker="s", ls="", ms=5, label="nominal condition"), _at_nominal("nominal speed and temperature"), *_circle([s for *_, s in meeting])]
         figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7.5)
     return figure
 
 
 def runout(found: ResonanceMap) -> Figure:
-    """Nonrepeatable runout of the linear response along temperature and along speed, with the coincidences passed on the way; not at rest, where there is none, for it does not grow from 0."""
+    """Nonrepeatable runout of the linear response along temperature and along speed, with the strongest coincidences passed on the way and the one nearest to the nominal condition; not at rest, where there is none, for it does not grow from 0."""
     t_nominal, n_nominal = found.nominal.temperature, found.nominal.speed / RPM
     at_speed = [c for c in found.coincidences if c.at_nominal_speed]
     at_temperature = [c for c in found.coincidences if abs(c.condition.temperature - t_nominal) < ALIKE]
@@ -186,20 +194,21 @@ def runout(found: ResonanceMap) -> Figure:
     )
     names, paints = ("radial", "axial"), ("#7a3d8f", "#a0741a")
     shown = [panel for panel in panels if len(panel[0]) > 1]
-    figure = Figure(figsize=(9.6, 4.4))
+    figure, ringed = Figure(figsize=(9.6, 4.6)), False
     for axes, (along, unit, crossed, place, label) in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         x, values = unit * along[:, 0], along[:, 1:]
         for series, name, paint in zip(values.T, names, paints, strict=True):
-            axes.plot(x, 1e9 * series, color=paint, marker=".", ms=4, lw=1.0, label=f"{name}, dots: computed")
-        marked = [c for c in strongest(crossed) if not c.repeats][:MARKED]
+            axes.plot(x, 1e9 * series, color=paint, marker=".", ms=3, lw=1.0, label=f"{name}, dots: computed")
+        every = [c for c in strongest(crossed) if not c.repeats]
+        marked = [*every[:MARKED], *(c for c in every[MARKED:] if c is nearest(found.coincidences))]
         for c in marked:
             axes.axvline(place(c), color=PALE, lw=0.8, ls=":")
             axes.plot(place(c), 1e9 * c.nrro, "o", mfc="none", mec=paints[names.index(c.line.direction)], ms=8, mew=1.2, clip_on=False)
         axes.set(xlabel=label, ylabel=f"nonrepeatable runout (NRRO) of the {looked_at(found.spindle)}, nm rms", xlim=(x[0], x[-1]))
         axes.set_ylim(0, 1.25e9 * max(values.max(), *(c.nrro for c in marked), 0.0) or 1.0)
         _name_tops(axes, [(place(c), f"{c.line.name}, {c.mode.number}", PALE) for c in marked])
-        handles = axes.get_legend_handles_labels()[0]
-        axes.legend(handles=[*handles, *[_circle()] * bool(marked)], loc="best")
+        ringed = ringed or bool(marked)
+    figure.legend(handles=[*axes.get_legend_handles_labels()[0], *[_ring("coincidence (line, mode number)")] * ringed], loc="outside lower center", ncols=3)
     return figure
 
 
@@ -225,7 +234,7 @@ def _around(speeds: Sequence[float], every: np.ndarray) -> tuple[float, float]:
 
 
 def _draw_mode(axes: Axes, x: np.ndarray, values: np.ndarray, mode: Track) -> None:
-    axes.plot(x, values, color=WHIRL[mode.whirl], lw=1.9)
+    axes.plot(x, values, color=WHIRL[mode.whirl], lw=HEAVY)
 
 
 def _mark(axes: Axes, marked: Sequence[tuple[float, float, float]]) -> None:
@@ -233,7 +242,7 @@ def _mark(axes: Axes, marked: Sequence[tuple[float, float, float]]) -> None:
     if marked:
         x, y, strength = np.array(marked).T
         size = 14 + 90 * np.sqrt(strength / (strength.max() or 1.0))
-        axes.scatter(x, y, s=size, facecolors="none", edgecolors=INK, lw=1.0, zorder=5)
+        axes.scatter(x, y, s=size, facecolors="none", edgecolors=INK, lw=1.0, zorder=5, clip_on=False)
 
 
 def _name_tops(axes: Axes, named: list[tuple[float, str, str]]) -> None:
@@ -264,17 +273,30 @@ def _name_tops(axes: Axes, named: list[tuple[float, str, str]]) -> None:
         )
 
 
-def _key(found: ResonanceMap, lines: Sequence[LineTrack], marked: bool) -> list[Line2D]:
+def _key(found: ResonanceMap, lines: Sequence[LineTrack], strengths: Sequence[float]) -> list[Line2D]:
+    """Modes by their whirl, lines by their cause, and the rings of coincidences so strong (m)."""
     handles = [
-        Line2D([], [], color=WHIRL[w], lw=1.9, label=f"mode, {WHIRLS[w]}")
+        Line2D([], [], color=WHIRL[w], lw=HEAVY, label=f"mode, {WHIRLS[w]}")
         for w in dict.fromkeys(m.whirl for m in found.modes)
     ]
     causes = dict.fromkeys(t.line.cause for t in lines)
-    handles += [Line2D([], [], color=CAUSES[c], lw=0.9, label=c) for c in causes]
+    handles += [Line2D([], [], color=CAUSES[c], lw=THIN, label=c) for c in causes]
     if any(t.line.whirl < 0 for t in lines):
-        handles.append(Line2D([], [], color=INK, lw=0.9, ls="--", label="line that whirls backward"))
-    return [*handles, *[_circle()] * marked]
+        handles.append(Line2D([], [], color=INK, lw=THIN, ls="--", label="line that whirls backward"))
+    return [*handles, *_circle(strengths)]
 
 
-def _circle() -> Line2D:
-    return Line2D([], [], color=INK, marker="o", mfc="none", ls="", label="coincidence")
+def _circle(strengths: Sequence[float]) -> list[Line2D]:
+    """Key to rings at coincidences so strong (m): their size, by the strongest; nothing where there are none."""
+    if not strengths:
+        return []
+    most = 1e9 * max(strengths)
+    return [_ring(f"coincidence, larger if stronger: at most {most:.{0 if most >= 10 else 2}f} nm" if most else "coincidence")]
+
+
+def _ring(name: str) -> Line2D:
+    return Line2D([], [], color=INK, marker="o", mfc="none", ls="", label=name)
+
+
+def _at_nominal(name: str) -> Line2D:
+    return Line2D([], [], color=PALE, lw=1.0, ls=":", label=name)

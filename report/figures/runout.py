@@ -28,6 +28,7 @@ LEAST = 1e-3  # nm that a plot reaches at least: what moves by less stands still
 LINE = 12  # revolutions that are drawn one after the other beside the band of all
 DECADES = 3.0  # of the spectrum below its strongest line
 ROOM = 250.0  # for labels, times the strongest line
+BEND, FOOT = 1.5, 3.5  # times the strongest line: where leaders leave the upright, and where they meet their labels
 RANGE = 50.0  # dB below the strongest line that the waterfall shows
 
 
@@ -148,7 +149,7 @@ def spectrum_figure(runout: Runout) -> Figure:
             axes.minorticks_off()
             axes.set_ylabel(f"{direction}, nm zero to peak")
             axes.set_xlim(0, highest)
-            _labels(axes, _named(own, NAMED[direction], 0.01 * highest), highest, top)
+            _labels(axes, _named(own, NAMED[direction], 0.01 * highest, len(runout.point.spindle.rolling)), highest, top)
         panels[1].set_xlabel("frequency, Hz")
         orders = panels[0].secondary_xaxis("top", functions=(lambda f: f / rate, lambda o: o * rate))
         orders.set_xlabel(f"orders of the turning frequency{'' if abs(runout.ratios[0]) == 1 else ' of the spindle'}, {rate:.5g} Hz")
@@ -167,7 +168,7 @@ def _large(every: Sequence[FoundLine]) -> list[FoundLine]:
 
 
 def waterfall_figure(spectra: Sequence[LineSpectrum], direction: str, size: tuple[float, float]) -> Figure:
-    """Spectra over frequency, one above the other in rpm, each rising by its level above `RANGE` dB below the strongest line of all;
+    """Spectra over frequency, one above the other in rpm, each rising by its level above `RANGE` dB below the strongest line of all, which the title tells;
     dots are natural frequencies."""
     highest = 500 * np.ceil(max(float(s.frequency.max(initial=1.0)) for s in spectra) / 500)
     grid = np.linspace(0, highest, 1201)
@@ -184,6 +185,8 @@ def waterfall_figure(spectra: Sequence[LineSpectrum], direction: str, size: tupl
             natural = spectra[k].natural[spectra[k].natural < highest]
             axes.plot(natural, np.full(len(natural), speeds[k]), ".", color=INK, ms=2.5)
         axes.set(xlabel="frequency, Hz", ylabel="speed, rpm", xlim=(0, highest))
+        title = f"A line at its speed: {RANGE:g} dB below the strongest of all, {TO_NM * amplitude.max():.3g} nm zero to peak.\nPeaks rise above it on a scale of dB. Dots: natural frequencies"
+        axes.set_title(title, fontsize=7.5, fontweight="normal")
         axes.grid(visible=False)
     return figure
 
@@ -200,15 +203,17 @@ def _marks(axes: Axes, own: Sequence[FoundLine]) -> None:
             axes.plot([g.frequency for g in some], [TO_NM * g.amplitude for g in some], marker, color=paint, ms=4, ls="none", label=label)
 
 
-def line_label(line: FoundLine, bearings: Sequence[str]) -> str:
-    """What a line is called in a figure: its name in the field's words and what causes it, in which bearing if in one alone."""
+def line_label(line: FoundLine, bearings: Sequence[str], every: int) -> str:
+    """What a line is called in a figure: its name in the field's words and what causes it, and below in which of a spindle's bearings, of which there are `every` many."""
     if not line.causes:
         return f"{line.order:.4g}x\nunexplained"
-    return f"{line.causes[0].name}\n{line.causes[0].cause}" + (f", {bearings[0]}" if len(bearings) == 1 and bearings[0] else "")
+    named = [b for b in bearings if b]
+    where = ("both bearings" if every == 2 else f"all {every} bearings") if len(named) == every else ", ".join(named)
+    return f"{line.causes[0].name}\n{line.causes[0].cause}" + f"\n{where}" * (every > 1 and bool(where))
 
 
-def _named(own: Sequence[FoundLine], most: int, near: float) -> list[tuple[FoundLine, str]]:
-    """The `most` strongest lines, and the strongest repeatable one, with their labels; lines of one kind in several bearings less than `near` (Hz) apart share one."""
+def _named(own: Sequence[FoundLine], most: int, near: float, every: int) -> list[tuple[FoundLine, str]]:
+    """The `most` strongest lines, and the strongest repeatable one, with their labels; lines of one kind in several of `every` bearings less than `near` (Hz) apart share one."""
     found: list[tuple[FoundLine, list[str]]] = []
     for line in sorted(own, key=lambda g: g is not next((h for h in own if h.repeatable), None)):
         first = line.causes[0] if line.causes else None
@@ -221,14 +226,14 @@ def _named(own: Sequence[FoundLine], most: int, near: float) -> list[tuple[Found
                 break
         else:
             found.append((line, bearings))
-    return [(line, line_label(line, sorted(bearings))) for line, bearings in found[:most]]
+    return [(line, line_label(line, sorted(bearings), every)) for line, bearings in found[:most]]
 
 
 def _labels(axes: Axes, named: Sequence[tuple[FoundLine, str]], highest: float, top: float) -> None:
-    """Upright labels above the lines, side by side, with leaders."""
+    """Upright labels above the lines, side by side, with leaders that stand over their lines and bend above all of them: none crosses another."""
     rising = sorted(named, key=lambda g: g[0].frequency)
-    places = spread(np.array([line.frequency for line, _ in rising]), 0.034 * highest, 0.012 * highest, 0.985 * highest)
+    rows = max((label.count("\n") + 1 for _, label in rising), default=1)
+    places = spread(np.array([line.frequency for line, _ in rising]), (0.012 + 0.011 * rows) * highest, 0.006 * rows * highest, (1 - 0.006 * rows) * highest)
     for (line, label), x in zip(rising, places, strict=True):
-        look = {"arrowstyle": "-", "color": PALE, "lw": 0.6, "shrinkA": 0, "shrinkB": 3}
-        peak, place = (line.frequency, TO_NM * line.amplitude), (x, 2.2 * top)
-        axes.annotate(label, peak, place, rotation=90, ha="center", va="bottom", ma="left", fontsize=7, linespacing=1.1, arrowprops=look)
+        axes.plot([line.frequency, line.frequency, x], [TO_NM * line.amplitude, BEND * top, FOOT * top], color=PALE, lw=0.6, zorder=1)
+        axes.text(x, 1.15 * FOOT * top, label, rotation=90, ha="center", va="bottom", ma="left", fontsize=7, linespacing=1.1)

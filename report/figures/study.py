@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +14,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
@@ -24,6 +27,7 @@ from thermospindle.sim.study.summary import at_conditions, first_set, frequencie
 Told = dict[str, Any]
 SHOWN = 12  # parameters of a map of sensitivities, campaigns' numbers of a map of distances
 PANELS, COLUMNS = 6, 4  # half the modes drawn, and how many beside each other
+NAMED = 4  # scenes of a title
 KEYED = 12  # lines named below a figure
 WIDTH, HANDLE, LETTER = 10.0, 0.6, 0.067  # inches: of a figure of panels, of a key's line, of a letter beside it
 CHANNELS: dict[str, list[dict[str, Any]]] = {
@@ -47,7 +51,8 @@ def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
     for i, told in enumerate(zip(*(table[c].to_pylist() for c in others), strict=True) if others else [()] * len(table)):
         lines.setdefault(told, []).append(i)
     x = numbers(table, along)
-    panels = [(f"mode {n}, Hz", y) for n, y in frequencies(table).items()][: 2 * PANELS]
+    kinds = kinds_of(of)
+    panels = [(f"mode {n} {kinds.get(n, '')}".rstrip() + ", Hz", y) for n, y in frequencies(table).items()][: 2 * PANELS]
     if of.study.runout:
         panels += [(f"{key.split('_')[0].upper()} {probe}, µm", numbers(table, f"{key}.{probe}")) for key in of_runout(of.spindle) for probe in ("x", "axial")]
     panels += [(f"preload {b.name}, N", numbers(table, f"preload_N.{b.name}")) for b in of.spindle.bearings]
@@ -61,7 +66,7 @@ def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
             least_span(axes, y)
             axes.set_title(title)
         for axes in grid[max(0, len(panels) - COLUMNS) : len(panels)]:
-            axes.set_xlabel(varied[along])
+            axes.set_xlabel(_worded(varied[along]))
         if 1 < len(key) <= KEYED:
             longest = max(len(str(line.get_label())) for line in key)
             figure.legend(handles=key, loc="outside lower center", ncols=max(1, min(COLUMNS, len(key), int(WIDTH / (HANDLE + LETTER * longest)))))
@@ -69,6 +74,33 @@ def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
 
 
 Look = dict[str, Any]
+
+
+def kinds_of(of: Cases) -> dict[int, str]:
+    """The kinds of the numbered modes of the scene as it stands, at the first condition that has them."""
+    found: dict[int, str] = {}
+    for _, modes in of.own.values():
+        for number, mode in enumerate(modes, 1):
+            found.setdefault(number, mode.kind)
+    return found
+
+
+UNIT = re.compile(r"_((?:N|W|J|Pa|GPa|C|K|Hz|kg|g|m|mm|um|s|deg|rad)\d?(?:_m\d?)?(?:_per_\w+)?)$")
+
+
+def _worded(key: str) -> str:
+    """A key of a scene in words with its unit: of `bearing_pair.preload_N` 'bearing pair preload, N'."""
+    unit = UNIT.search(key)
+    name = (key[: unit.start()] if unit else key).split(".")[-2:]
+    return " ".join(name).replace("_", " ") + (f", {unit[1].replace('_per_', '/').replace('_', ' ').replace('um', 'µm')}" if unit else "")
+
+
+def headed(drawn: Mapping[str, Figure], title: str, scenes: Sequence[str]) -> Mapping[str, Figure]:
+    """The figures of a study, each below what study it is of and of which scene or scenes."""
+    said = f"{title}: {', '.join(scenes[:NAMED])}" + f" and {len(scenes) - NAMED} more" * (len(scenes) > NAMED)
+    for figure in drawn.values():
+        figure.suptitle(textwrap.fill(said, int(figure.get_figwidth() / 0.09)), x=0.01, ha="left", fontweight="bold", fontsize=9.5)
+    return drawn
 
 
 def looks_of(others: Sequence[str], lines: Sequence[tuple[Any, ...]]) -> tuple[dict[tuple[Any, ...], Look], list[Line2D]]:
@@ -133,20 +165,28 @@ def _spreads(of: Cases, table: pa.Table) -> Figure:
     columns = {f"preload {b.name}": f"preload_N.{b.name}" for b in of.spindle.bearings}
     if of.study.runout:
         columns |= {f"{'RRO' if key == 'rro_um' else 'NRRO 6 s.d.'} {probe}": f"{key}.{probe}" for key in of_runout(of.spindle) for probe in ("x", "y", "axial")}
-    titles = [f"mode {n}" for n in modes] + list(columns)
+    kinds = kinds_of(of)
+    titles = [f"mode {n} {kinds.get(n, '')}".rstrip() for n in modes] + list(columns)
     figure, grid = _grid(len(titles))
     for k, title in enumerate(titles):
         axes = grid[k]
         for here, rows in parts:
             values = frequencies(rows).get(modes[k]) if k < len(modes) else numbers(rows, columns[title])
             known = values[np.isfinite(values)] if values is not None else np.array([])
-            if len(known) > 1:
+            if len(known) > 1 and not known.any():
+                axes.axvline(0.0, color=colour(here["temperature_C"], every), ls="--" if here["speed_rpm"] else "-")
+            elif len(known) > 1:
                 label = f"{here['temperature_C']:g} °C" + (f", {here['speed_rpm']:g} rpm" if here["speed_rpm"] else "")
                 least, middle = SAME * float(np.abs(known).max()), float(known.mean())
                 bins: Look = {"bins": "auto"} if np.ptp(known) > least else {"bins": 1, "range": (middle - least, middle + least)}
                 axes.hist(known, **bins, density=True, histtype="step", color=colour(here["temperature_C"], every), ls="--" if here["speed_rpm"] else "-", label=label)  # fmt: skip
+        if axes.lines and not axes.patches:
+            axes.set(xlim=(-1.0, 1.0), xticks=[0.0])
+            axes.text(0.04, 0.5, "0 in every draw", transform=axes.transAxes, va="center", color=PALE)
         axes.set_title(title)
         axes.set_yticks([])
+        if k % COLUMNS == 0:
+            axes.set_ylabel("density of the draws")
         axes.set_xlabel("Hz" if k < len(modes) else "µm" if "RRO" in title else "N")
     handles, labels = grid[0].get_legend_handles_labels()
     if handles:
@@ -179,8 +219,12 @@ def _inputs_map(own: Sequence[tuple[str, Mapping[str, float]]], largest: float, 
     values = np.array([[by.get(n, np.nan) for _, by in own] for n in shown])
     figure = Figure(figsize=(2.8 + 0.62 * len(own), 1.5 + 0.3 * len(shown)))
     axes = figure.subplots()
-    _map(axes, values, largest, shown, [label for label, _ in own], ".2f", 0.05)
-    axes.set_title(f"{title}, {told['temperature_C']:g} °C, {told['speed_rpm']:g} rpm")
+    picture = _map(axes, values, largest, shown, [label for label, _ in own], ".2f", 0.05)
+    bar = figure.colorbar(picture, ax=axes, shrink=0.9, pad=0.01)
+    bar.outline.set_visible(False)
+    bar.set_label("blank: not clear of chance")
+    heading = f"{title}, {told['temperature_C']:g} °C, {told['speed_rpm']:g} rpm"
+    axes.set_title(textwrap.fill(heading, int((figure.get_figwidth() - 1.5) / 0.09)))
     return figure
 
 
@@ -214,12 +258,13 @@ def _frame(x: int, y: int) -> Rectangle:
     return Rectangle((x - 0.5, y - 0.5), 1, 1, fill=False, edgecolor=INK, lw=1.4)
 
 
-def _map(axes: Axes, values: Array, largest: float, rows: Sequence[str], columns: Sequence[str], form: str, least: float) -> None:
+def _map(axes: Axes, values: Array, largest: float, rows: Sequence[str], columns: Sequence[str], form: str, least: float) -> AxesImage:
     """A matrix in colours, its numbers of at least `least` written into it."""
-    axes.imshow(values, aspect="auto", cmap="RdBu_r", norm=TwoSlopeNorm(0.0, -largest, largest))
+    picture = axes.imshow(values, aspect="auto", cmap="RdBu_r", norm=TwoSlopeNorm(0.0, -largest, largest))
     axes.set_yticks(range(len(rows)), rows)
     axes.set_xticks(range(len(columns)), columns, rotation=60, ha="right", fontsize=7.5)
     axes.grid(visible=False)
     for i, j in zip(*np.nonzero(np.abs(np.nan_to_num(values)) >= least), strict=True):
         value = values[i, j]
         axes.text(j, i, format(value, form).replace("-", "−"), ha="center", va="center", fontsize=7, color="white" if abs(value) > 0.7 * largest else INK)
+    return picture

@@ -29,17 +29,12 @@ def figure(warmup: Warmup) -> Figure:
     panels = drawn.subplots(2, 3 if rolling else 2, sharex=True, gridspec_kw={"wspace": 0.08})
     minutes = warmup.times / MINUTE
     bearings = [b.name for b in warmup.spindle.bearings]
-    parts = {g.name: g.part for g in warmup.spindle.regions}
-    regions = list(warmup.moments[0].temperatures)
-    temperature = np.array([[m.temperatures[g] for g in regions] for m in warmup.moments])
-    axes = panels[0, 0]
-    for series, name in zip(temperature.T, regions, strict=True):
-        axes.plot(minutes, series, color=PARTS[parts[name]], lw=1.0)
-    groups = _alike(temperature, [parts[g] for g in regions])
-    names = [_group_name([regions[k] for k in group], parts) for group in groups]
-    ends = np.array([temperature[-1, group].mean() for group in groups])
-    least_span(axes, temperature, WARMER)
-    name_ends(axes, ends, names, [PARTS[parts[regions[group[0]]]] for group in groups])
+    axes, groups = panels[0, 0], region_groups(warmup)
+    for _, part, temperature in groups:
+        axes.plot(minutes, temperature, color=PARTS[part], lw=1.0)
+    least_span(axes, np.concatenate([temperature for *_, temperature in groups], axis=1), WARMER)
+    ends = np.array([temperature[-1].mean() for *_, temperature in groups])
+    name_ends(axes, ends, [name for name, *_ in groups], [PARTS[part] for _, part, _ in groups])
     axes.set(title="Region temperatures", ylabel="temperature, °C")
     for part, paint in PARTS.items():
         axes.plot([], [], color=paint, label=f"{part} part")
@@ -81,14 +76,28 @@ def _of_bearings(axes: Axes, minutes: Array, values: Array, bearings: Sequence[s
     if not bearings:
         axes.set_axis_off()
         return
-    same = bool(len(bearings) > 1 and np.ptp(values, axis=1).max() < 1e-6 * np.abs(values).max())
-    for k, series in enumerate(values.T[:1] if same else values.T):
+    names = bearing_names(values, bearings)
+    for k, series in enumerate(values.T[: len(names)]):
         paint, _, dashes = BEARINGS[k % len(BEARINGS)]
         axes.plot(minutes, series, color=paint, ls=dashes, lw=1.5)
     least_span(axes, values)
-    names = ["both bearings" if len(bearings) == 2 else f"all {len(bearings)} bearings"] if same else list(bearings)
     name_ends(axes, values[-1, : len(names)], names, [BEARINGS[k % len(BEARINGS)][0] for k in range(len(names))])
     axes.set(title=title, ylabel=label)
+
+
+def bearing_names(values: Array, bearings: Sequence[str]) -> list[str]:
+    """Names of `values` (times, bearings): those of the bearings, or one for all where they are the same."""
+    same = len(bearings) > 1 and np.ptp(values, axis=1).max() < 1e-6 * np.abs(values).max()
+    return ["both bearings" if len(bearings) == 2 else f"all {len(bearings)} bearings"] if same else list(bearings)
+
+
+def region_groups(warmup: Warmup) -> list[tuple[str, str, Array]]:
+    """Regions that have nearly one temperature together: their name, their part, and their temperatures (times, regions) in C."""
+    parts = {g.name: g.part for g in warmup.spindle.regions}
+    regions = list(warmup.moments[0].temperatures)
+    temperature = np.array([[m.temperatures[g] for g in regions] for m in warmup.moments])
+    groups = _alike(temperature, [parts[g] for g in regions])
+    return [(_group_name([regions[k] for k in group], parts), parts[regions[group[0]]], temperature[:, group]) for group in groups]
 
 
 def _alike(series: Array, parts: Sequence[str]) -> list[list[int]]:

@@ -92,7 +92,7 @@ def frf_views(shown: Shown, pair: Pair) -> rrb.Container:
         plot(shown, f"{origin}/phase", "phase, deg" + f" ({NO_COHERENCE})" * (not shown.coherent), (-185.0, 185.0)),
     ]
     if shown.coherent:
-        views.append(plot(shown, f"{origin}/coherence", "coherence", (0.0, 1.03)))
+        views.append(plot(shown, f"{origin}/coherence", "coherence", (-0.15, 1.05)))  # its 0 above the numbers of the axis below
     return rrb.Vertical(
         *views,
         row_shares=[2.6, 1, 1][: len(views)],

@@ -18,9 +18,8 @@ from thermospindle.report.figures import run as figures
 from thermospindle.report.log.blueprint import frfs_below_key, model_views, pair_path, plot, shapes_tab, sweeping
 from thermospindle.report.log.columns import curve_look, log_curve, log_values, whole_log
 from thermospindle.report.log.content import Shown, frf_of, shown
-from thermospindle.report.log.drawing import heat
 from thermospindle.report.log.pictures import for_dark, log_figure, view
-from thermospindle.report.log.run import log_test
+from thermospindle.report.log.run import BEARINGS, log_test
 from thermospindle.report.log.views import at, axis, summary_view
 from thermospindle.sim.hammer.pulse import pulse_duration
 from thermospindle.sim.operating import provenance
@@ -28,6 +27,8 @@ from thermospindle.sim.run import Run
 
 CHART = (4.2, 4.4)  # inches, of the picture of the records
 EARLY = 0.1  # of a record, drawn in the picture: later it has died away
+HITS = ((200, 150, 255), (90, 220, 210), (255, 160, 210), (225, 225, 225), (205, 155, 95))
+"""Colours of hits: none of them is a temperature's (`drawing.HEAT`) or that of measured modes."""
 MOST = 12  # FRFs in the tab that shows them beside each other
 
 
@@ -51,7 +52,7 @@ def log_records(recording: rr.RecordingStream, content: Shown) -> None:
     about = {"hammer": list(hammers), "hits": [hits] * len(hammers), "sample_rate_Hz": [step.test.settings.sample_rate] * len(hammers)}
     log_values(recording, "numbers/records", about)
     log_values(recording, "numbers/responses", {"node": list(nodes)})
-    paints, colours = [heat(k, (0, max(hits - 1, 1))) for k in range(hits)], [heat(k, range(len(nodes))) for k in range(len(nodes))]
+    paints, colours = [HITS[k % len(HITS)] for k in range(hits)], [BEARINGS[k % len(BEARINGS)] for k in range(len(nodes))]
     panels: dict[str, list[tuple[Array, Array, figures.Colour]]] = {}
     for h, hammer in enumerate(hammers):
         for k in range(hits):
@@ -70,7 +71,7 @@ def log_records(recording: rr.RecordingStream, content: Shown) -> None:
             ):
                 part = slice(*np.searchsorted(record.time, (begin, end)))
                 panels.setdefault(title, []).append((1e3 * record.time[part], values[part], for_dark(paints[k])))
-    log_figure(recording, "charts/records", figures.panels(panels, 2, CHART, "ms"))
+    log_figure(recording, "charts/records", figures.panels(panels, 2, CHART, "ms", {f"hit {k + 1}": for_dark(paint) for k, paint in enumerate(paints)} if hits > 1 else None))
 
 
 # ---------------------------------------------------------------- what is shown

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import rerun as rr
@@ -41,7 +41,8 @@ from thermospindle.sim.run import Run
 from thermospindle.thermal.expansion import DeformedSection, field
 
 BEARINGS = ((90, 200, 255), (255, 170, 80), (130, 225, 120), (255, 125, 185), (185, 150, 255), (235, 225, 110))  # in their order
-MEASURED = ((120, 255, 140), (30, 190, 90))
+MEASURED: tuple[tuple[tuple[int, int, int], Literal["up", "down"], str], ...] = (((120, 255, 140), "up", "^"), ((255, 215, 80), "down", "v"))
+"""Of measured modes at one temperature and the next: colour, and mark in the log and in a figure."""
 KEYS = 5  # temperatures named in the key, at most
 LIGHT = (235, 235, 235)
 TURNING = (0.95, 0.62, 0.25)  # tint of what turns, among the mode shapes
@@ -108,7 +109,8 @@ def log_peaks(recording: rr.RecordingStream, content: Shown) -> None:
         marks["identified", f"mode {mode}"] = (look, own, None)
     for k, ((source, test), own) in enumerate(content.measured.items()):
         name = f"measured {own[0].temperature:g} °C ({source})"
-        look = rr.SeriesPoints(colors=[MEASURED[k % 2]], markers="up", marker_sizes=5, names=name)
+        paint, marker, _ = MEASURED[k % len(MEASURED)]
+        look = rr.SeriesPoints(colors=[paint], markers=marker, marker_sizes=5, names=name)
         marks["measured", f"{source} {test}"] = (look, own, content.level[0] + 2.0 + 4.0 * k)
     for pair in content.pairs:
         for (group, name), (look, own, height) in marks.items():
@@ -128,7 +130,8 @@ def log_key(recording: rr.RecordingStream, content: Shown) -> None:
     curves = [(f"{t:g} °C", for_dark(heat(t, content.temperatures))) for t in np.array(content.temperatures)[some]]
     marks = [("identified", for_dark(LIGHT), "D")]
     for k, own in enumerate(content.measured.values()):
-        marks.append((f"measured {own[0].temperature:g} °C", for_dark(MEASURED[k % 2]), "^"))
+        paint, _, marker = MEASURED[k % len(MEASURED)]
+        marks.append((f"measured {own[0].temperature:g} °C", for_dark(paint), marker))
     modes = [m.frequency for m in content.modes]
     log_figure(recording, "charts/key", figures.key(curves, marks, modes, content.band, CHARTS["key"]))
 

@@ -84,7 +84,7 @@ def _effects(found: Ladder) -> Iterator[str]:
     for r in (r for r in found.steps if r.effects):
         below = found.step(r.above)
         gain = r.evidence - below.evidence
-        unseen = f"held out {below.held_out:.2f} -> {r.held_out:.2f}, " if np.isfinite(r.held_out) else ""
+        unseen = f"left out {below.held_out:.2f} -> {r.held_out:.2f}, " if np.isfinite(r.held_out) else ""
         change = f"error {below.error:.2f} -> {r.error:.2f}, {unseen}tolerances "
         change += f"{below.stretch:.2f} -> {r.stretch:.2f} s.d., ln evidence {evidence(gain, '+')}"
         own = r.effects[-1:] if r.name.startswith("+") else r.effects

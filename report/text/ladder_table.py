@@ -23,10 +23,10 @@ from thermospindle.report.progress import plain_lines
 from thermospindle.report.text.ladder import evidence, leading, sentences
 from thermospindle.report.typeset import known
 
-COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "shifts\nHz", "build\ns.d.", "ln\nevidence")
+COLUMNS = ("step", "error\ns.e.", "left out\ns.e.", "error\nHz", "shifts\nHz", "tolerances\ns.d.", "ln\nevidence")
 LEGEND = (
-    "Errors are rms residuals; s.e. are standard errors of the data (of every FRF line, or of a table's numbers) or, held out, of the prediction "
-    "by a fit that has not seen that temperature, or, at one condition, that mode. Hz: of natural frequencies. Build: rms of the fitted build tolerances in their own "
+    "Errors are rms residuals; s.e. are standard errors of the data (of every FRF line, or of a table's numbers) or, left out, of the prediction "
+    "by a fit that has not seen that temperature, or, at one condition, that mode. Hz: of natural frequencies. Tolerances: rms of the fitted ones in their own "
     "standard deviations. What `diagnose` calls fitted grants constant errors of the model beside the tolerances, as the step \"constant discrepancy\" does."
 )
 

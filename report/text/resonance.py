@@ -16,7 +16,7 @@ from thermospindle.model.units import RPM, in_rpm
 from thermospindle.report.text.grid import OF_LINES, show_grid
 from thermospindle.report.typeset import figure, known, prose, table, write_csv
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.resonance.found import NEARBY, Coincidence, ResonanceMap, strongest
+from thermospindle.sim.resonance.found import NEARBY, Coincidence, ResonanceMap, nearest, strongest
 from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.probes import looked_at
 
@@ -123,8 +123,7 @@ def sentences(found: ResonanceMap) -> list[str]:
     rpm = f"{found.nominal.speed / RPM:g} rpm"
     crossed = [c for c in found.coincidences if c.at_nominal_speed]
     if not crossed:
-        excited = [c for c in found.coincidences if c.strength > 0] or list(found.coincidences)
-        apart = min(excited, key=lambda c: abs(c.margin), default=None)
+        apart = nearest(found.coincidences)
         near = f"; nearest is {_line(apart)}, {100 * apart.margin:+z.{2 if abs(apart.margin) < 1e-3 else 1}f} % from {_mode(apart)}{_width(apart)}" if apart else ""
         return [f"This spindle at {rpm} crosses no line {_between(found)}{near}."]
     said = []

@@ -76,7 +76,7 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
         values = {"title": asked.title, "kind": asked.kind, "scene": scenes, "cases": of.count, **told}
         write_table(table, folder.path / RESULTS)
         write(folder.path / SUMMARY, json.dumps(values, indent=1))
-        save_all(drawn, folder.path, 140)
+        save_all(figures.headed(drawn, asked.title, [s.name for s in spindles]), folder.path, 140)
         write_study_log(spindles, values, table, drawn, folder.path / LOG)
     values |= {"out": str(place), "parts": folder.count, "parts_found": there, "warnings": [*doubts, *_warnings(values)]}
 

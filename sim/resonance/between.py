@@ -2,7 +2,7 @@
 
 Place and frequency come from the polynomial through the four nearest points of the grid. Strengths are those of the line on the mode at both
 neighbours, each at its own resonance, interpolated linearly. Runout is that of all lines at the nearer neighbour, line by line with their frequencies and
-the pole of the mode moved to the crossing. What this is worth is seen where crossings are also found exactly (`found.Interpolated`).
+the pole of the mode moved to the crossing; a map computes it where its curves of runout pass. What this is worth is seen where crossings are also found exactly (`found.Interpolated`).
 """
 
 from __future__ import annotations

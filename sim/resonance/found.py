@@ -96,7 +96,7 @@ class ResonanceMap:
     """Natural frequencies and lines on the grid `temperatures` (C) x `speeds` (rad/s), and where they meet.
 
     `nrro_speed`, `nrro_temperature` (n, 3): place (rad/s or C), radial and axial rms (m), along speed at the nominal temperature and along
-    temperature at the nominal speed, denser about the strongest coincidences. `beyond`: what is met within `NEARBY` outside the
+    temperature at the nominal speed, with every coincidence there that was found exactly and denser about the strongest. `beyond`: what is met within `NEARBY` outside the
     speeds at the nominal temperature, strongest first, where that was asked. `drawn_from` is the seed of imperfections that the scene does not name, None if it does.
     """
 
@@ -133,6 +133,12 @@ def strongest(coincidences: Sequence[Coincidence]) -> list[Coincidence]:
     for c in sorted(coincidences, key=lambda c: -c.strength):
         best.setdefault((c.line.cause, c.line.order, c.line.direction, c.line.whirl, c.mode.number), c)
     return list(best.values())
+
+
+def nearest(coincidences: Sequence[Coincidence]) -> Coincidence | None:
+    """The one whose line is nearest to its mode at the nominal condition, of those that the map's imperfections excite if they excite any; None of none."""
+    excited = [c for c in coincidences if c.strength > 0] or list(coincidences)
+    return min(excited, key=lambda c: abs(c.margin), default=None)
 
 
 def once(coincidences: Sequence[Coincidence]) -> list[Coincidence]:

@@ -17,6 +17,7 @@ How strong a crossing is: amplitude of the mode's own part of the response, phi 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,11 +27,11 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.sim.resonance.between import passes_zero
-from thermospindle.sim.resonance.found import Curve, ResonanceMap, once, strongest
+from thermospindle.sim.resonance.found import Coincidence, Curve, ResonanceMap, once, strongest
 from thermospindle.sim.resonance.grid import PARTS, Candidate, Grid, same_direction
 
 MULTIPLES = 3  # of the number of balls, and even ball orders, whose lines are drawn
-DENSER = 6  # coincidences about which runout is computed at more places
+DENSER = 18  # coincidences about which runout is computed at more places, as many as a report lists
 
 
 def resonance_map(
@@ -70,12 +71,13 @@ def resonance_map(
     found = [met_by[id(c)] for _, own in candidates for c in own if id(c) in met_by]
     found.sort(key=lambda c: (not c.at_nominal_speed, -c.strength, c.frequency))
     of_runout = [c for c in found if not c.repeats]  # which NRRO is made of
-    crossed = [c.condition.speed for c in strongest([c for c in of_runout if c.condition.temperature == nominal.temperature])]
-    met = [c.condition.temperature for c in strongest([c for c in of_runout if c.at_nominal_speed])]
+    crossed = [c for c in of_runout if c.condition.temperature == nominal.temperature]
+    met = [c for c in of_runout if c.at_nominal_speed]
     found = once(found)
     progress(f"{len(found)} coincidences")
-    along_s = np.array([(s, *grid.nrro(Condition(nominal.temperature, s), (t0, _nearest(over_s, s)))) for s in _dense(over_s, crossed)])
-    along_t = np.array([(t, *grid.nrro(Condition(t, nominal.speed), (_nearest(over_t, t), s0))) for t in _dense(over_t, met)])
+    along_s = np.array([(s, *grid.nrro(Condition(nominal.temperature, s), (t0, _nearest(over_s, s)))) for s in _dense(over_s, crossed, lambda c: c.condition.speed)])
+    along_t = np.array([(t, *grid.nrro(Condition(t, nominal.speed), (_nearest(over_t, t), s0))) for t in _dense(over_t, met, lambda c: c.condition.temperature)])
+    found = [_on_curve(c, along_s, along_t, nominal) for c in found]
     progress("runout along both axes")
     beyond = grid.beyond(tracks, of_lines, over_s, (t0, s0)) if nearby else ()
     return ResonanceMap(
@@ -103,11 +105,22 @@ def _nearest(values: Array, value: float) -> int:
     return int(np.argmin(np.abs(values - value)))
 
 
-def _dense(grid: Array, places: Sequence[float]) -> list[float]:
-    """The grid with some values more about the first `DENSER` places, within one step of it."""
+def _dense(grid: Array, met: Sequence[Coincidence], place: Callable[[Coincidence], float]) -> list[float]:
+    """The grid, the places of all that is met at the nominal speed or was found exactly, where runout may have a peak that the grid misses, and some values more about those of the
+    `DENSER` strongest, within one step of the grid."""
     step = float(np.diff(grid).max(initial=0.0))
-    more = [p + share * step for p in places[:DENSER] for share in (-0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5)]
-    return sorted({*grid.tolist(), *(p for p in more if grid[0] <= p <= grid[-1])})
+    own = [place(c) for c in met if c.at_nominal_speed or not c.interpolated]
+    more = [place(c) + share * step for c in strongest(met)[:DENSER] for share in (-0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5)]
+    return sorted({*grid.tolist(), *(p for p in [*own, *more] if grid[0] <= p <= grid[-1])})
+
+
+def _on_curve(c: Coincidence, along_s: Array, along_t: Array, nominal: Condition) -> Coincidence:
+    """An interpolated coincidence with the runout that was computed where it is, if it was: the curves of runout and the list say the same."""
+    if not c.interpolated or not (c.at_nominal_speed or c.condition.temperature == nominal.temperature):
+        return c
+    along, place = (along_t, c.condition.temperature) if c.at_nominal_speed else (along_s, c.condition.speed)
+    here = along[along[:, 0] == place]
+    return replace(c, nrro=float(here[0, 2 if c.line.direction == "axial" else 1])) if len(here) else c
 
 
 def _along_speed(gap: Array, over_t: Array, over_s: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from tests.conftest import SCENE
+from tests.conftest import ROOT, SCENE
 from tests.diagnosis.mode_tables import SD, tables
 from thermospindle.cli import main
 from thermospindle.diagnosis.decision.explanations import Candidate
@@ -26,7 +26,7 @@ from thermospindle.report.log.ladder_content import response, shown
 from thermospindle.report.log.read import read_log
 from thermospindle.report.page.ladder import section, write_ladder
 from thermospindle.report.text.ladder import sentences
-from thermospindle.report.text.ladder_table import ladder_json
+from thermospindle.report.text.ladder_table import COLUMNS, LEGEND, ladder_json
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.operating import operating_point
@@ -268,6 +268,25 @@ def test_picture_and_report_section_name_every_step(lagging):
     assert words == []
     assert html.count("<svg") == 1
     assert "as drawn" in html
+
+
+def test_numbers_of_the_picture_stand_on_a_ground_of_their_own(lagging):
+    """1.52 and 1.38 were struck through by the line of the data's errors."""
+    axes = figure(lagging).get_axes()[0]
+    numbers = [t for t in axes.texts if t.get_text()]
+    assert len(numbers) >= len(lagging.steps)
+    assert all(t.get_bbox_patch().get_facecolor()[:3] == (1.0, 1.0, 1.0) and t.get_zorder() > max(line.get_zorder() for line in axes.lines) for t in numbers)
+
+
+def test_figure_table_and_page_say_left_out_and_tolerances(lagging):
+    """Held out here and left out there, build here and tolerances there were one thing."""
+    assert COLUMNS[2:6:3] == ("left out\ns.e.", "tolerances\ns.d.")
+    said = " ".join([LEGEND, section(lagging)[1], *sentences(lagging)])
+    assert "held out" not in said
+    assert "build" not in LEGEND
+    page = (ROOT / "docs" / "site" / "ladder.md").read_text()
+    assert "left out, s.e. | tolerances, s.d." in page
+    assert "held out" not in page
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.figures import common, designs, warmup
 from thermospindle.report.figures import report as plots
+from thermospindle.report.figures import study as studies
 from thermospindle.report.figures.common import colour
 from thermospindle.report.figures.run import panels
 from thermospindle.report.figures.study import looks_of
@@ -220,3 +222,74 @@ def test_ticks_of_residuals_are_plain_numbers_on_both_sides(largest, ends):
     values = [float(t) for t in told]
     assert values == sorted(values) == [-v for v in reversed(values)]
     assert 0.0 in values
+
+
+# ---------------------------------------------------------------- studies
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("lowest_Hz", "Lowest mode, Hz"),
+        ("lowest_Hz.axial", "Lowest axial mode, Hz"),
+        ("lowest_damping_ratio", "Damping of the lowest mode, %"),
+        ("stiffness_N_per_um.axial", "Stiffness axial, N/µm"),
+        ("rro_um.y", "RRO along y, µm"),
+        ("nrro_six_sigma_um.x", "NRRO, six sigma, along x, µm"),
+        ("another", "another"),
+    ],
+)
+def test_figures_of_designs_have_words_and_units(key, words):
+    """Raw keys stood above the panels."""
+    assert designs.worded(key) == words
+
+
+def test_a_design_without_a_number_is_unknown_and_no_mark_is_cut_off():
+    """Bearings by numbers roll no balls: nothing stood where their NRRO would, and marks lay on the edge of the panel."""
+    one, other = {"nominal": 0.146}, {"nominal": None}
+    figures = {"nrro_six_sigma_um.x": {"designs": {"a": one, "b": other}}, "lowest_damping_ratio": {"designs": {"a": {"nominal": 0.005}, "b": {"nominal": 0.008}}}}
+    told = {"designs": [{"design": "a"}, {"design": "b"}], "conditions": [{"temperature_C": t, "speed_rpm": 7200.0, "figures": figures} for t in (20.0, 40.0)]}
+    runout, damping, *_ = designs.compared(told)["comparison"].axes
+    [unknown] = runout.texts
+    assert (unknown.get_text(), unknown.get_position()[0]) == ("unknown", 1)
+    assert not damping.texts
+    drawn = np.array([line.get_xydata()[0] for line in damping.lines])
+    assert sorted(drawn[:, 1]) == pytest.approx([0.5, 0.5])
+    low, high = damping.get_xlim()
+    assert (low, high) == (-0.5, 1.5)
+
+
+def test_pictures_of_a_study_say_of_which_study_and_scene():
+    drawn = studies.headed({"sweep": Figure(figsize=(10, 4)), "narrow": Figure(figsize=(2, 2))}, "Preload of the drive", ["hdd_2003", *"abcde"])
+    assert drawn["sweep"].get_suptitle() == "Preload of the drive: hdd_2003, a, b, c and 2 more"
+    assert "\n" in drawn["narrow"].get_suptitle()
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("bearing_pair.preload_N", "bearing pair preload, N"),
+        ("structure.joints.cone.lateral_stiffness_N_per_m", "cone lateral stiffness, N/m"),
+        ("speed, rpm", "speed, rpm"),
+        ("structure.bodies.hub.mass_kg", "hub mass, kg"),
+        ("bearings.lower.balls", "lower balls"),
+    ],
+)
+def test_axes_of_a_sweep_have_words_and_units(key, words):
+    assert studies._worded(key) == words
+
+
+def test_sensitivities_have_a_key_to_their_colours():
+    """And their condition in the title."""
+    own = [("1 axial", {"preload": 0.9, "mass": np.nan}), ("2 axial", {"preload": 0.01, "mass": -0.4})]
+    drawn = studies._inputs_map(own, 1.0, "Coefficients", {"temperature_C": 60.0, "speed_rpm": 7200.0})
+    axes, bar = drawn.axes
+    assert "Coefficients, 60 °C, 7200 rpm" in axes.get_title().replace("\n", " ")
+    assert bar.get_ylim() == (-1.0, 1.0)
+    assert "blank" in bar.get_ylabel()
+    assert {t.get_text() for t in axes.texts} == {"0.90", "−0.40"}
+
+
+def test_panels_of_modes_name_their_kind():
+    kinds = [SimpleNamespace(kind=k) for k in ("axial", "rocking")]
+    assert studies.kinds_of(SimpleNamespace(own={"cold": (None, kinds[:1]), "warm": (None, kinds)})) == {1: "axial", 2: "rocking"}

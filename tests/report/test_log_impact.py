@@ -8,15 +8,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rerun as rr
 from rerun.chunk import RrdReader
 
 import thermospindle as ts
 from tests.small_run import small_run
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
+from thermospindle.report.figures.run import panels
 from thermospindle.report.log import impact as log
 from thermospindle.report.log.blueprint import framed
 from thermospindle.report.log.content import decibel, peaks, shown
+from thermospindle.report.log.drawing import HEAT
+from thermospindle.report.log.run import MEASURED
 from thermospindle.report.log.told import describe
 from thermospindle.sim import posing
 from thermospindle.sim.hammer.test import estimate_of
@@ -155,3 +159,18 @@ def test_a_response_that_vanishes_by_symmetry_does_not_set_the_limits(run: Run) 
     others = [h1.value[h1.response_nodes.index(r), h1.reference_nodes.index(h)] for r, h in shown(run).pairs if (r, h) != (2, 1)]
     assert shown(less).level[0] == 10 * np.floor(np.percentile(decibel(np.array(others)), 0.5) / 10) - 5
     assert shown(less).level[1] == shown(run).level[1]
+
+
+def test_colours_of_hits_are_no_temperatures_and_have_a_key(two_hits: Run, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were blue and red beside blue and red of temperatures, without a word; and measured modes at two temperatures were two like greens."""
+    keys = []
+    monkeypatch.setattr(log.figures, "panels", lambda *args: keys.append(args[4]) or panels(*args))
+    with rr.RecordingStream("thermospindle") as recording:
+        log.log_records(recording, shown(two_hits))
+    assert list(keys[0]) == ["hit 1", "hit 2"]
+    for paint in log.HITS:
+        others = np.array([*HEAT, *(m[0] for m in MEASURED)])
+        assert np.abs(others - paint).max(axis=1).min() > 40
+    (first, mark, _), (second, other, _) = MEASURED
+    assert np.abs(np.subtract(first, second)).max() > 100
+    assert mark != other

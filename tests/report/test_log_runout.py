@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rerun as rr
+import rerun.blueprint as rrb
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from rerun.chunk import RrdReader
@@ -23,9 +24,20 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM, TO_MM
-from thermospindle.report.figures.runout import LEAST, LINE, RANGE, _polar, motion_figure, polar_figure, spectrum_figure, waterfall_figure
+from thermospindle.report.figures.runout import (
+    LEAST,
+    LINE,
+    RANGE,
+    _polar,
+    line_label,
+    motion_figure,
+    polar_figure,
+    spectrum_figure,
+    waterfall_figure,
+)
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe
+from thermospindle.report.log.turning.blueprint import blueprint, reach
 from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, rolling_elements, summary, write_runout_log
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.posing import cage_turns, frame_indices, turning_poses
@@ -304,3 +316,49 @@ def test_nothing_is_left_half_written(record, tmp_path, monkeypatch):
     with pytest.raises(ZeroDivisionError):
         write_runout_log(record, [], tmp_path / "runout.rrd")
     assert list(tmp_path.iterdir()) == []
+
+
+# ---------------------------------------------------------------- what can be read off
+
+
+@pytest.mark.parametrize(("largest", "high"), [(82.9, 100.0), (100.0, 100.0), (101.0, 150.0), (2.2, 3.0), (0.061, 0.08), (0.0, 1.0)])
+def test_panels_reach_to_a_round_number(largest, high):
+    assert reach(largest) == pytest.approx(high)
+
+
+def test_panels_of_runout_tell_their_range(record, monkeypatch):
+    """Their only tick was 0, so that no amplitude could be read."""
+    made = []
+    monkeypatch.setattr(rrb, "TimeSeriesView", lambda **look: made.append(look) or rrb.Spatial2DView())
+    blueprint(record, 100.0, True)
+    cut = record.by_lines
+    for look, part, values in zip(made, ("RRO", "NRRO"), (cut.repeatable[:3], cut.nonrepeatable[:3]), strict=True):
+        high = reach(1e9 * float(np.abs(values).max()))
+        assert look["name"].startswith(f"{part} ({'non' * (part == 'NRRO')}repeatable), panel ±{high:g} nm: hub x red, y blue, axial green")
+        assert 1e9 * np.abs(values).max() <= high
+        assert look["axis_y"].range.as_arrow_array().to_pylist() == [[-high, high]]
+
+
+def test_the_waterfall_says_what_its_decibels_are_relative_to(spectra):
+    title = waterfall_figure(spectra, "radial", (6.6, 4.8)).axes[0].get_title(loc="left")
+    assert f"{RANGE:g} dB below the strongest of all, {1e9 * max(s.radial.max() for s in spectra if len(s.radial)):.3g} nm zero to peak" in title
+    assert "Dots: natural frequencies" in title
+
+
+def test_labels_of_a_spectrum_say_the_bearing_and_their_leaders_do_not_cross(record):
+    """Twice '2 fb - fc, ball waviness' of bearings of two sizes stood side by side, and a leader went across another."""
+    first = next(g for g in record.lines if g.causes and g.causes[0].bearing and not g.repeatable and g.direction == "radial")
+    cause, far = first.causes[0], 40 * record.turning
+    assert line_label(replace(first, causes=(cause,)), ["lower"], 2) == f"{cause.name}\n{cause.cause}\nlower"
+    assert line_label(first, ["lower", "upper"], 2) == f"{cause.name}\n{cause.cause}\nboth bearings"
+    assert line_label(first, ["lower", "upper"], 5) == f"{cause.name}\n{cause.cause}\nlower, upper"
+    assert line_label(first, ["lower"], 1) == f"{cause.name}\n{cause.cause}"
+    close = [replace(first, frequency=far + k, amplitude=a * first.amplitude, causes=(replace(cause, name=f"{k}"),)) for k, a in enumerate((0.02, 1.0, 0.1, 0.5))]
+    axes = spectrum_figure(replace(record, lines=(*record.lines[:4], *close))).axes[0]
+    leaders = [line.get_xydata() for line in axes.lines if len(line.get_xdata()) == 3]
+    assert len(leaders) >= 5
+    for one, other in combinations(leaders, 2):
+        low, high = sorted((one, other), key=lambda line: line[0, 0])
+        assert low[2, 0] < high[2, 0], "labels stand in the order of their lines, so neither upright nor slanted parts meet"
+        assert low[1, 1] == high[1, 1] >= max(low[0, 1], high[0, 1])
+        assert low[0, 0] == low[1, 0]

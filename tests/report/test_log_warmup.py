@@ -18,6 +18,7 @@ from thermospindle.model.bearing.pair import contact_status
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import MINUTE, RPM
+from thermospindle.report.figures.warmup import figure
 from thermospindle.report.log import told
 from thermospindle.report.log.drawing import HEAT
 from thermospindle.report.log.turning import warmup as log
@@ -50,14 +51,14 @@ def test_numbers_come_back_bit_for_bit(warm: Warmup, file: Path) -> None:
 
 def test_what_is_drawn_is_what_was_computed(warm: Warmup, file: Path) -> None:
     answer, drawn = warmup_json(warm), log.series(warm)
-    assert drawn["Preload, N"]["lower"][0].tolist() == pytest.approx(answer["preload_N"], abs=1e-9)  # rounded, so that a constant one looks constant
-    assert drawn["Bearings, °C"]["upper"][0].tolist() == answer["bearings"]["upper"]["temperature_C"]
-    assert sum(drawn["Friction heat, mW"][b][0] for b in ("lower", "upper")) == pytest.approx(1e3 * np.array(answer["friction_W"]), rel=1e-12)
+    assert drawn["bearings/preload"]["both bearings"][0].tolist() == pytest.approx(answer["preload_N"], abs=1e-9)  # rounded, so that a constant one looks constant
+    assert drawn["bearings/temperature"]["upper"][0].tolist() == answer["bearings"]["upper"]["temperature_C"]
+    assert sum(drawn["bearings/friction heat"][b][0] for b in ("lower", "upper")) == pytest.approx(1e3 * np.array(answer["friction_W"]), rel=1e-12)
     shift = np.array(answer["frequencies_Hz"], float)[:, 0] - answer["frequencies_Hz"][0][0]
     name = f"1 axial {answer['frequencies_Hz'][0][0]:.0f} Hz"
-    assert drawn["Natural frequencies, Hz of change since the start"][name][0].tolist() == shift.tolist()
+    assert drawn["modes"][name][0].tolist() == shift.tolist()
     contents = ts.read_log(file)
-    assert contents.entities["/series/Preload\\,\\ N/lower"] == len(warm.times) + 1  # the series and its look
+    assert contents.entities["/series/bearings/preload/both\\ bearings"] == len(warm.times) + 1  # the series and its look
 
 
 def test_the_section_has_the_colours_of_its_temperatures(warm: Warmup, file: Path) -> None:
@@ -152,3 +153,23 @@ def test_a_lost_mode_is_null(warm: Warmup, tmp_path: Path) -> None:
 def test_an_absent_folder(warm: Warmup, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"absent/warmup\.rrd: its folder does not exist"):
         log.write_warmup_log(warm, tmp_path / "absent" / "warmup.rrd")
+
+
+def test_entities_are_short_paths_of_the_names_in_the_figure(warm: Warmup, file: Path) -> None:
+    """They were long titles in escaped letters, regions had no names at all, and nothing said what the section's colours between the ends are."""
+    entities = [e for e in ts.read_log(file).entities if e.startswith("/series/")]
+    assert {e.split("/")[2] for e in entities} == {"regions", "bearings", "modes"}
+    assert {"/series/regions/shaft", "/series/bearings/temperature/lower", "/series/bearings/friction\\ heat/upper"} <= set(entities)
+    with_names = {t.get_text() for axes in figure(warm).axes for t in axes.texts}
+    assert {*log.series(warm)["regions"], *log.series(warm)["bearings/preload"]} <= with_names
+    assert set(log.titles(warm)) >= set(log.series(warm))
+    key = log.key_to_colours(warm)
+    labels = key.labels.as_arrow_array().to_pylist()
+    assert (labels[0], labels[-1], len(labels)) == ("20 °C", f"{warm.history.nodal.max():.4g} °C", len(HEAT))
+
+
+def test_keys_stand_beyond_the_end_of_their_curves() -> None:
+    """They covered the curves."""
+    assert log.beyond(60.0, ["lower", "upper"]) == pytest.approx(60.0 / (1 - 0.1825))
+    assert log.beyond(60.0, ["lower", "x" * 36]) > 2 * 60.0
+    assert log.beyond(60.0, []) > 60.0

@@ -6,6 +6,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from thermospindle.model.units import TO_NM
 from thermospindle.report.log.blueprint import framed
 from thermospindle.report.log.pictures import view
 from thermospindle.report.log.views import DARK, scene, summary_view, window
@@ -14,6 +15,7 @@ from thermospindle.sim.running.runout import Runout
 
 WATERFALL, POLAR = (6.6, 4.8), (4.2, 3.3)  # inches
 WORDS = {"RRO": "repeatable", "NRRO": "nonrepeatable"}
+STANDS = 1e-3  # nm that is no motion
 PLAYED = 3.0  # revolutions of the spindle that a second shows
 
 
@@ -33,24 +35,34 @@ def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
         time_ranges=[grown],
     )
     charts = [
-        view(f"charts/waterfall_{direction}", f"{direction.capitalize()} lines, 50 dB each; dots: natural frequencies", WATERFALL)
+        view(f"charts/waterfall_{direction}", f"{direction.capitalize()} lines over speed", WATERFALL)
         for direction in ("radial", "axial")
         if waterfall
     ]
-    series = [_series(part, some, 4 / turning, where) for part, some in (("RRO", (0, 1, 2)), ("NRRO", (3, 4, 5)))]
+    largest = {"RRO": np.abs(cut.repeatable[:3]).max(), "NRRO": np.abs(cut.nonrepeatable[:3]).max()}
+    series = [_series(part, some, 4 / turning, where, reach(TO_NM * float(largest[part]))) for part, some in (("RRO", (0, 1, 2)), ("NRRO", (3, 4, 5)))]
     middle = rrb.Vertical(*([rrb.Tabs(*charts)] if charts else []), *series, row_shares=[2.6, 1, 1] if charts else [1, 1])
     polar = view("charts/polar", f"Error motion of {where} x", POLAR)
     right = rrb.Vertical(polar, summary_view(), row_shares=[1, 1.5])
     return window(rrb.Horizontal(rrb.Vertical(model, orbit), middle, right, column_shares=[1, 1.55, 1.0]), "time", playback_speed=PLAYED / turning)
 
 
-def _series(part: str, chosen: tuple[int, ...], seconds: float, where: str) -> rrb.View:
-    """RRO or NRRO of the three probes in a window of `seconds` about the cursor."""
+def reach(largest: float) -> float:
+    """The next round number above the `largest` value (nm) of a panel, in which it stands from minus to plus that: an axis so low has no number but 0."""
+    if not largest > STANDS:
+        return 1.0
+    decade = 10.0 ** np.floor(np.log10(largest))
+    return float(decade * next(step for step in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0) if step * decade >= largest * (1 - 1e-9)))
+
+
+def _series(part: str, chosen: tuple[int, ...], seconds: float, where: str, high: float) -> rrb.View:
+    """RRO or NRRO of the three probes in a window of `seconds` about the cursor, from -`high` to `high` (nm)."""
     ends = [rr.TimeRangeBoundary.cursor_relative(seconds=t) for t in (-seconds / 2, seconds / 2)]
     return rrb.TimeSeriesView(
         origin="signals",
-        name=f"{part} ({WORDS[part]}), nm: {where} x red, {where} y blue, axial green",
+        name=f"{part} ({WORDS[part]}), panel ±{high:g} nm: {where} x red, y blue, axial green",
         overrides={"signals": rr.SeriesLines(visible_series=[i in chosen for i in range(6)])},
         axis_x=rrb.TimeAxis(view_range=rr.TimeRange(*ends)),
+        axis_y=rrb.ScalarAxis(range=(-high, high)),
         plot_legend=rrb.PlotLegend(visible=False),
     )

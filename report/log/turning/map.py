@@ -28,7 +28,7 @@ from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.found import ResonanceMap, strongest
 
 CAMPBELL, SMALL = (8.5, 8.3), (6.5, 3.1)  # inches
-WHIRL = {"forward": (255, 110, 80), "backward": (90, 160, 255), "mixed": (200, 130, 255), "none": (90, 220, 160)}
+WHIRL = {"forward": (255, 110, 80), "backward": (90, 160, 255), "mixed": (150, 150, 150), "none": (235, 235, 235)}
 WHITE = (235, 235, 235)
 TICK = 100  # ticks of the timeline in a degree
 TEMPERATURE = "temperature, 0.01 C"

@@ -1,11 +1,12 @@
 """The Rerun log of a warm-up: the section heats up on the timeline `time`, and temperatures, preload, friction and natural frequencies beside it.
 
 `numbers/warmup` holds what `warmup.csv` holds, a component a column of it and a row a time step, as computed; the series for the eye are the
-same numbers, natural frequencies as their change since the start. `report.log.read` reads it back.
+same numbers under the names of warmup.png: of regions of nearly one temperature their mean, natural frequencies as their change since the start. `report.log.read` reads it back.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +17,19 @@ import rerun.blueprint as rrb
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM, TO_MM
 from thermospindle.report.figures.common import BEARINGS
-from thermospindle.report.figures.warmup import MODES, PARTS
+from thermospindle.report.figures.warmup import MODES, bearing_names, region_groups
 from thermospindle.report.log.blueprint import framed
 from thermospindle.report.log.columns import curve_look, log_curve, log_words, number_column, whole_log
 from thermospindle.report.log.content import made_from
-from thermospindle.report.log.drawing import heat, light, outlines
+from thermospindle.report.log.drawing import HEAT, heat, light, outlines
 from thermospindle.report.log.views import at, axis, scene, summary_view, window
 from thermospindle.report.text.warmup import heat_sums, lost_contact, rows
 from thermospindle.report.typeset import power
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.warmup import Warmup, clearance, most_friction, roller_names, rollers
 
-CLEARANCE = "Clearance of rollers, µm across"
+CLEARANCE = "bearings/clearance"
+LETTER, MARGIN, MOST = 0.0125, 0.12, 0.6  # of the width of a view that a letter of the key to its curves takes, what surrounds it, and all of it at most
 SECONDS = 12.0  # in which all of it is played
 
 
@@ -57,34 +59,52 @@ def log_numbers(recording: rr.RecordingStream, warmup: Warmup) -> None:
 
 
 def series(warmup: Warmup) -> dict[str, dict[str, tuple[Array, Any]]]:
-    """What is drawn over time, (times,) with its colour, by view and name."""
+    """What is drawn over time, (times,) with its colour, by entity and name; `titles` says what it is."""
     moments, spindle = warmup.moments, warmup.spindle
-    parts = {g.name: g.part for g in spindle.regions}
     friction = [b.name for b in spindle.ringed]
     bearings, rolling = [b.name for b in spindle.bearings], roller_names(warmup)
-    unit, scale = power(most_friction(warmup))
+    _, scale = power(most_friction(warmup))
     shift = warmup.frequencies - warmup.frequencies[0]
     modes = {f"{k} {m.kind} {f:.0f} Hz": k - 1 for k, (m, f) in enumerate(zip(warmup.modes, warmup.frequencies[0], strict=True), 1)}
+    regions = region_groups(warmup)
+    paints = {b: _of_bearing(k) for k, b in enumerate(friction)}
+
+    def each(values: Array, names: list[str]) -> dict[str, tuple[Array, Any]]:
+        """(times, bearings) by bearing, or once where they are the same."""
+        return {told: (own, paints[name]) for told, name, own in zip(bearing_names(values, names), names, values.T, strict=False)}
+
     return {
-        "Regions, °C: stationary blue, rotating orange": {
-            g: (np.array([m.temperatures[g] for m in moments]), light(PARTS[parts[g]])) for g in moments[0].temperatures
+        "regions": {
+            name: (own.mean(axis=1), light(MODES[k % len(MODES)])) for k, (name, _, own) in enumerate(regions)
         },
-        "Bearings, °C": {b: (np.array([m.bearing_temperatures[b] for m in moments]), _of_bearing(k)) for k, b in enumerate(friction)},
+        "bearings/temperature": each(np.array([[m.bearing_temperatures[b] for b in friction] for m in moments]), friction),
         # in nN, or rounding errors of a spring's constant force fill the panel
-        "Preload, N": {b: (np.round([m.preload[b] for m in moments], 9), _of_bearing(k)) for k, b in enumerate(bearings)},
-        "Contact angle, deg": {
-            b: (np.degrees([m.point.state.bearing(b).contact_angle for m in moments]), _of_bearing(k)) for k, b in enumerate(bearings)
-        },
-        **({CLEARANCE: {b: (np.array(rollers(warmup, b)["clearance_um"]), _of_bearing(friction.index(b))) for b in rolling}} if rolling else {}),
-        f"Friction heat, {unit}": {b: (scale * np.array([m.friction[b] for m in moments]), _of_bearing(k)) for k, b in enumerate(friction)},
-        "Natural frequencies, Hz of change since the start": {n: (shift[:, k], light(MODES[k % len(MODES)])) for n, k in modes.items()},
+        "bearings/preload": each(np.round([[m.preload[b] for b in bearings] for m in moments], 9), bearings),
+        "bearings/contact angle": each(np.degrees([[m.point.state.bearing(b).contact_angle for b in bearings] for m in moments]), bearings),
+        **({CLEARANCE: each(np.array([rollers(warmup, b)["clearance_um"] for b in rolling]).T, rolling)} if rolling else {}),
+        "bearings/friction heat": each(scale * np.array([[m.friction[b] for b in friction] for m in moments]), friction),
+        "modes": {n: (shift[:, k], light(MODES[k % len(MODES)])) for n, k in modes.items()},
+    }
+
+
+def titles(warmup: Warmup) -> dict[str, str]:
+    """What stands above the views of `series`."""
+    unit, _ = power(most_friction(warmup))
+    return {
+        "regions": "Regions, °C",
+        "bearings/temperature": "Bearings, °C",
+        "bearings/preload": "Preload, N",
+        "bearings/contact angle": "Contact angle, deg",
+        CLEARANCE: "Clearance of rollers, µm across",
+        "bearings/friction heat": f"Friction heat, {unit}",
+        "modes": "Natural frequencies, Hz of change since the start",
     }
 
 
 def log_series(recording: rr.RecordingStream, warmup: Warmup) -> None:
     for group, own in series(warmup).items():
         for name, (values, paint) in own.items():
-            log_curve(recording, at("series", group, name), _over_time(warmup), values, curve_look(paint, name, 1.5))
+            log_curve(recording, at("series", *group.split("/"), name), _over_time(warmup), values, curve_look(paint, name, 1.5))
 
 
 def _of_bearing(k: int) -> tuple[int, int, int]:
@@ -111,7 +131,18 @@ def log_section(recording: rr.RecordingStream, warmup: Warmup) -> None:
             columns = rr.Mesh3D.columns(vertex_colors=paint).partition(np.full(len(warmup.times), len(r)))
             recording.send_columns(entity, [_over_time(warmup)], columns)
     lines = [strip * [side, 1, 1] for strip in outlines(warmup.spindle) for side in (-1, 1)]
+    recording.log("section/key", key_to_colours(warmup), static=True)
     recording.log("section/outline", rr.LineStrips3D(lines, colors=[(255, 255, 255, 90)], radii=rr.Radius.ui_points(0.4)), static=True)
+
+
+def key_to_colours(warmup: Warmup) -> rr.Points3D:
+    """Dots in the colours of `drawing.HEAT`, each with its temperature: a row above the section, or beside that of a long spindle."""
+    low, high = _ends(warmup)
+    long, r, z = framed(warmup.spindle)
+    temperatures = np.linspace(low, high, len(HEAT))
+    places = [(0.95 * r, 0.0, z + s * r) if long else (s * r, 0.0, 1.1 * r) for s in np.linspace(-0.7, 0.7, len(HEAT))]
+    labels = [f"{t:.4g} °C" for t in temperatures]
+    return rr.Points3D(places, colors=heat(temperatures, (low, high)), labels=labels, show_labels=True, radii=rr.Radius.ui_points(6.0))
 
 
 def summary(warmup: Warmup) -> str:
@@ -145,17 +176,21 @@ def summary(warmup: Warmup) -> str:
 # ---------------------------------------------------------------- what is shown
 
 
+def beyond(end: float, names: Sequence[str]) -> float:
+    """Where an axis of time (s) ends that leaves room for the key to its curves, with these names, beyond the `end` of them."""
+    return float(end / (1 - min(MARGIN + LETTER * max(map(len, names), default=0), MOST)))
+
+
 def _blueprint(warmup: Warmup) -> rrb.Blueprint:
     """The section heating up over the summary, and all series beside them."""
     low, high = _ends(warmup)
     long, r, z = framed(warmup.spindle)
     away, height = (2.1 * r, z) if long else (2.6 * r, 0.3 * r)
-    section = scene("section", f"Section, blue {low:.4g} °C to red {high:.4g} °C", (0, -away, height), (0, 0, height))
-    times, named = axis("seconds", 0.0, float(warmup.times[-1])), rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
-    hidden = rrb.PlotLegend(visible=False)  # more regions than a legend holds
+    section = scene("section", f"Section, {low:.4g} to {high:.4g} °C", (0, -away, height), (0, 0, height))
+    named, title = rrb.PlotLegend(corner=rrb.Corner2D.RightTop), titles(warmup)
     views = [
-        rrb.TimeSeriesView(origin=at("series", group), name=group, axis_x=times, plot_legend=hidden if group.startswith("Regions") else named)
-        for group in series(warmup)
+        rrb.TimeSeriesView(origin=at("series", *group.split("/")), name=title[group], axis_x=axis("seconds", 0.0, beyond(warmup.times[-1], [*own])), plot_legend=named)
+        for group, own in series(warmup).items()
     ]
     left = rrb.Vertical(section, summary_view(), row_shares=[1.2, 1])
     everything = rrb.Horizontal(left, rrb.Grid(*views, grid_columns=2), column_shares=[1, 1.9])

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
 from matplotlib import rc_context
+from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 
 from tests.sim.resonance.conftest import NOMINAL
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import STYLE
-from thermospindle.report.figures.resonance import CAUSES, both, campbell, figures, over_temperature, runout
+from thermospindle.report.figures.resonance import CAUSES, WHIRL, both, campbell, drawn_lines, figures, over_temperature, runout
 from thermospindle.report.figures.warmup import MODES
 from thermospindle.report.text.resonance import map_section, told
-from thermospindle.sim.resonance.map import resonance_map
+from thermospindle.sim.resonance.found import nearest
+from thermospindle.sim.resonance.map import _on_curve, resonance_map
+from thermospindle.sim.resonance.point import key
 
 
 def test_the_key_of_a_figure_names_the_causes_of_its_lines(found):
@@ -128,3 +131,78 @@ def test_runout_over_speed_begins_where_the_spindle_turns(found):
     assert found.nrro_speed[0].tolist() == [0.0, 0.0, 0.0]
     drawn = figures(found)["nrro"].axes[1].lines[0].get_xydata()
     assert drawn[0] == pytest.approx(found.nrro_speed[1, :2] * [1 / RPM, 1e9])
+
+
+def test_every_coincidence_of_the_table_is_a_point_of_the_runout_curve(found, met):
+    """Between places of the grid the curve passed 21 nm where the table said 35.8 nm: only the six strongest were among its places."""
+    for of in (found, met):
+        along_speed = [c for c in of.coincidences if not c.repeats and c.condition.temperature == NOMINAL.temperature]
+        along_temperature = [c for c in of.coincidences if not c.repeats and c.at_nominal_speed]
+        for curve, listed in ((of.nrro_speed, [(c, c.condition.speed) for c in along_speed]), (of.nrro_temperature, [(c, c.condition.temperature) for c in along_temperature])):
+            for c, place in listed:
+                [row] = curve[curve[:, 0] == place]
+                assert row[2 if c.line.direction == "axial" else 1] == pytest.approx(c.nrro, rel=1e-9)
+    assert len(along_temperature) >= 1
+    assert len([c for c in found.coincidences if c.condition.temperature == NOMINAL.temperature]) > 20
+
+
+def test_runout_rings_the_coincidence_nearest_to_the_nominal_condition(found):
+    """It is the one that the first sentence names, however weak."""
+    c = nearest(found.coincidences)
+    right = runout(found).axes[-1]
+    rings = [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in right.lines if line.get_marker() == "o"]
+    assert c.condition.temperature == NOMINAL.temperature
+    assert (pytest.approx(c.condition.speed / RPM), pytest.approx(1e9 * c.nrro)) in rings
+
+
+def test_the_lines_that_the_first_sentences_name_are_drawn(found, met):
+    """However many are stronger: the nearest was left out, and nothing said where the nominal speed is."""
+    for of in (found, met):
+        named = [c for c in of.coincidences if c.at_nominal_speed] or [nearest(of.coincidences)]
+        crowd = replace(of, coincidences=tuple(replace(c, strength=1e-15) if c in named else c for c in of.coincidences))
+        for c in named:
+            assert key(c.line)[1:] in {key(t.line)[1:] for t in drawn_lines(crowd)}  # of two bearings one
+        [key_below] = campbell(crowd).legends
+        assert "nominal speed, 7200 rpm" in [t.get_text() for t in key_below.get_texts()]
+    assert key(nearest(found.coincidences).line) in {key(t.line) for t in drawn_lines(found)}
+
+
+def test_rings_are_whole_and_their_size_has_a_key(found):
+    figure = campbell(found)
+    [rings] = figure.axes[0].collections
+    assert not rings.get_clip_on()
+    assert any(t.get_text().startswith("coincidence, larger if stronger: at most ") and t.get_text().endswith(" nm") for t in figure.legends[0].get_texts())
+
+
+SEEN = {
+    "all colours": np.eye(3),
+    "no green": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "no red": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+}
+"""Linear RGB as it is seen (Machado et al., IEEE Trans. Vis. Comput. Graph. 15, 2009, 1291, severity 1)."""
+
+
+@pytest.mark.parametrize("seen", SEEN)
+def test_modes_and_causes_differ_in_colour(seen):
+    """By 15 in CIE Lab, where 2 can just be seen; the green of axial modes was that of ball waviness, the purple of mixed whirl that of outer waviness."""
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]) / np.array([[0.9505], [1.0], [1.089]])
+
+    def lab(paint):
+        c = np.array(to_rgb(paint))
+        linear = np.clip(SEEN[seen] @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), 0, 1)
+        xyz = to_xyz @ linear
+        x, y, z = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
+        return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+    for a, b in combinations([*WHIRL.values(), *CAUSES.values()], 2):
+        assert np.linalg.norm(lab(a) - lab(b)) > 15, (a, b)
+
+
+def test_an_interpolated_coincidence_has_the_runout_of_the_curve_where_it_passes(met):
+    """On a coarse grid of temperatures its ring stood beside the curve, by a tenth of its value."""
+    c = next(c for c in met.coincidences if c.at_nominal_speed)
+    rough = replace(c, interpolated=True, nrro=1.0)
+    assert _on_curve(rough, met.nrro_speed, met.nrro_temperature, met.nominal).nrro == pytest.approx(c.nrro, rel=1e-9)
+    assert _on_curve(replace(rough, interpolated=False), met.nrro_speed, met.nrro_temperature, met.nominal).nrro == 1.0
+    elsewhere = replace(rough, condition=replace(c.condition, temperature=33.3333))
+    assert _on_curve(elsewhere, met.nrro_speed, met.nrro_temperature, met.nominal).nrro == 1.0
