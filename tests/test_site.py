@@ -90,6 +90,28 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert dead_links(tmp_path) == []
 
 
+@pytest.mark.slow
+def test_the_tutorial_prints_what_the_program_says(tmp_path, capsys, monkeypatch):
+    """Its third and fourth part, line by line; what three dots stand for is left out."""
+    monkeypatch.chdir(tmp_path)
+    page = (SITE / "tutorial.md").read_text(encoding="utf-8")
+    answers = {typed: shown for typed, shown in re.findall(r"\$ (spindle [^\n]+)\n(.*?)(?=```|\n\$ )", page, re.DOTALL)}
+    files = sorted(str(f) for f in (DATA / "foreign_bond").glob("*.uff"))
+    assert main(["import", *files, "--scene", "hdd_2003", "--mapping", "lab.toml"]) == 0
+    assert main(["import", *files, "--scene", "hdd_2003", "--mapping", "lab.toml", "--out", "campaign"]) == 0
+    capsys.readouterr()
+    for typed in (
+        "compare hdd_2003 campaign --out compared",
+        "diagnose hdd_2003 campaign --out found",
+        "add hdd_2003 bond_softening --from found/diagnosis.json --out mine",
+        "compare mine campaign --before hdd_2003",
+    ):
+        assert main(typed.split()) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        for piece in re.split(r"\.\.\.", " ".join(answers[f"spindle {typed}"].split())):
+            assert piece.strip(" ,") in said, (typed, piece)
+
+
 def test_links_of_the_repository_lead_somewhere():
     """Pages are read there too: what `make docs` has yet to write is said to be so beside its link."""
     for page in [ROOT / "README.md", ROOT / "CHANGELOG.md", *SITE.glob("*.md")]:

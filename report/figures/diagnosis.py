@@ -79,7 +79,7 @@ def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str], ende
     axes.set_yticks(range(len(names)), names)
     axes.set(xlim=(1.05 * low, high + (0.14 if all(ended) else 0.3) * (high - low)), ylim=(len(names) - 0.4, -0.6))
     axes.set_xlabel("ln evidence over the model without effects")
-    axes.set_title("How far every explanation leads")
+    axes.set_title("How far the best explanations lead")
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", length=0)
     return figure
