@@ -17,6 +17,7 @@ from tests.conftest import SCENE
 from thermospindle import cli
 from thermospindle.cli import main
 from thermospindle.options import parsers
+from thermospindle.report.verbs import running
 from thermospindle.report.verbs.states import modes, table
 
 ROOT = Path(__file__).parents[1]
@@ -203,12 +204,29 @@ def test_limits_of_sense_warn(capsys, scene):
     assert capsys.readouterr().err.startswith("spindle: warning: 150 C lies outside")
 
 
-def test_runout_of_nothing_hints(capsys, scene):
+def test_runout_of_a_scene_without_imperfections_draws_those_of_the_map(capsys, scene):
     bare = scene((r"(?s)\n\[imperfections\].*\Z", "\n"))
     assert main(["runout", str(bare), "--speed", "7200", "--path", "linear"]) == 0
     captured = capsys.readouterr()
-    assert "--seed 1 draws plausible ones" in captured.err
-    assert "Strongest lines" not in captured.out
+    assert "plausible ones are drawn, of seed 0 as map and report have them" in captured.err
+    assert "Strongest lines" in captured.out
+    assert main(["runout", str(bare), "--speed", "7200", "--path", "linear", "--seed", "0"]) == 0
+    again = capsys.readouterr()
+    assert (again.out, "seed 0" in again.err) == (captured.out, False)
+
+
+def test_a_long_record_of_a_flexible_shaft_says_what_is_quicker(capsys, monkeypatch):
+    """A simulated record of a million steps took ten minutes on a busy machine, where the linear answer takes seconds."""
+    monkeypatch.setattr(running, "LONG", 1000)
+    monkeypatch.setattr(running, "simulated_runout", stopped)
+    assert main(["runout", "five_bearing", "--speed", "8000", "--seconds", "0.05"]) == 130
+    assert "hint: --path linear" in capsys.readouterr().err
+    assert main(["runout", str(SCENE), "--speed", "7200", "--seconds", "0.05"]) == 130
+    assert "hint" not in capsys.readouterr().err
+
+
+def stopped(*asked):
+    raise KeyboardInterrupt
 
 
 # ---------------------------------------------------------------- terminal

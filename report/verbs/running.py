@@ -14,7 +14,7 @@ from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import MINUTE, RPM
-from thermospindle.report.progress import progress_bar
+from thermospindle.report.progress import hint, progress_bar
 from thermospindle.report.text.resonance import map_json, show_map, write_map
 from thermospindle.report.text.runout import runout_json, show_runout, write_runout
 from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_json, write_warmup
@@ -30,11 +30,13 @@ from thermospindle.report.verbs.answer import (
 from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
 from thermospindle.sim.resonance.map import fastest, resonance_map, stages
+from thermospindle.sim.running.run import record_steps
 from thermospindle.sim.running.runout import planned, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
 from thermospindle.sim.warmup import SHORTEST, STAGES, Warmup, warm_up
 
 STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
+LONG = 500_000  # steps of a simulated record, from which it takes more than half a minute of a flexible shaft
 
 
 def runout(
@@ -68,6 +70,9 @@ def runout(
         spindle = with_imperfections(spindle, drawn(spindle, seed))
         point = operating_point(spindle, condition)
     plan = planned(point, seconds, element, path)
+    steps = record_steps(plan.samples, round(1 / (plan.rate * spindle.hammer.step))) if plan.path == "simulated" else 0
+    if steps > LONG and element == "linear" and spindle.structure.shafts:
+        hint(f"--path linear gives the exact harmonic answer of linear bearings in seconds; the record that is simulated takes {steps / 1e6:.1f} million steps")
     with progress_bar(plan.pieces + 5) as progress:
         found = simulated_runout(point, seconds, element, plan.path, progress)
         progress("record analysed")
