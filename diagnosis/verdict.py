@@ -28,7 +28,7 @@ from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition
 from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
 
-STEPS = (4.0, 7.0, 18.0, 15.0, 6.0, 2.0, 8.0)  # of progress, beside one a test: about how long each takes, in what reading a test takes
+STEPS = (4.0, 7.0, 18.0, 15.0, 6.0, 0.1, 2.0, 8.0)  # of progress, beside one a test: about how long each takes, in what reading a test takes
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +112,7 @@ def diagnose(
     named = [v for e in usable(spindle, catalogue) if e.name not in present for v in variants(e)]
     found = search(model, named, free_forms(spindle, unmoved(spindle, [d.condition for d in model.tests])), progress)
     verdict = decide(found)
+    progress(": ".join(filter(None, (verdict.word, ", ".join(verdict.effects)))))  # who stops what follows has this
     drifting = (c for c in verdict.free if len(c.hypothesis.mechanisms) == 1 and not c.hypothesis.mechanisms[0].beyond and c.delta_evidence > 0)
     alone = sorted(drifting, key=lambda c: -c.delta_evidence)
     drifts = tuple(_drift(found, c.hypothesis, 0) for c in alone)

@@ -28,7 +28,7 @@ from thermospindle.sim.running.runout import planned, runout, with_imperfections
 from thermospindle.sim.warmup import STAGES, warm_up
 
 STEPS = 3  # of progress, beside those of the warm-up, of the map and of the ladders
-LADDER_STEPS = 13  # of each ladder, beside three a test: it reads modes, and the diagnosis reads lines
+LADDER_STEPS = 14  # of each ladder, beside three a test: it reads modes, and the diagnosis reads lines
 OVER_TEMPERATURE, OVER_SPEED = 13, 31  # grid of the map
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from tests.conftest import DATA, ROOT, SCENE
 from tests.virtual_campaign import drawn, mode_campaign, model_of, virtual_campaign
+from thermospindle.diagnosis import verdict as verdicts
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import diagnose, unable
@@ -79,6 +80,16 @@ def test_nothing_is_named_in_the_scenes_own_virtual_tests(spindle):
     effects = tuple(by_name(n) for n in ("soak_lag", "hub_flexibility"))
     verdict = diagnose(spindle, read_campaign(SCENE / "virtual" / "soak_20_60"), effects).verdict
     assert (verdict.word, verdict.effects) == ("none", ())
+
+
+def test_the_verdict_is_told_before_what_follows_it(spindle, nothing_missing, monkeypatch):
+    """Whoever stops a long diagnosis while next tests are weighed has read it on standard error."""
+    monkeypatch.setattr(verdicts, "campaign_data", lambda *asked: nothing_missing.search.model)
+    monkeypatch.setattr(verdicts, "search", lambda *asked: nothing_missing.search)
+    told = []
+    diagnose(spindle, nothing_missing.campaign, (by_name("soak_lag"),), told.append)
+    assert told == ["none", "next tests weighed", "smallest sizes found"]
+    assert len(verdicts.STEPS) == len(["without effects", "screened", "fitted", "pairs", "best anew"]) + len(told)
 
 
 def test_probabilities_add_up_to_one(nothing_missing):

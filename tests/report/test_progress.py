@@ -79,7 +79,7 @@ def test_steps_that_take_longer_are_told_to_do_so():
     """Eight tests are read in 8 s; what fits effects takes eighteen times as long as one of these."""
     takes = [*[1.0] * 8, *STEPS]
     assert f"about {sum(STEPS):.0f} s left" in progress._line(8.0, 8.0, 8, takes, "read")
-    assert "8 of 15 steps done" in progress._line(8.0, 8.0, 8, takes, "read")
+    assert "8 of 16 steps done" in progress._line(8.0, 8.0, 8, takes, "read")
 
 
 @pytest.mark.parametrize("verb", ["compare", pytest.param("ladder", marks=pytest.mark.slow)])
