@@ -241,29 +241,25 @@ def with_mass_between(linear: Matrices, between: Between | None) -> Poles:
 def poles_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray]:
     """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m); of a flexible shaft by
     its reduced model, where `highest` is finite, and with its mass where it is and not at nodes, where that is told."""
-    n = len(linear.mass)
-    if n <= LARGE or not np.isfinite(highest):
-        p = with_mass_between(linear, between)
-        found = oscillating(p, highest, stiffest_of(linear))
-        return p.value[found], p.right[:, found]
-    value, right, _ = _reduced_below(linear, highest, highest, FINE, between, False)
+    value, right, _ = _below(linear, highest, highest, FINE, between, False)
     return value, right
 
 
 def vectors_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """The same, with their left vectors (m, n), scaled as those of `Poles`; of a flexible shaft those up to half of `highest` to 1e-5, the rest to 1e-4."""
-    n = len(linear.mass)
-    if n <= LARGE or not np.isfinite(highest):
-        p = with_mass_between(linear, between)
-        found = oscillating(p, highest, stiffest_of(linear))
-        return p.value[found], p.right[:, found], p.left[found]
-    return _reduced_below(linear, highest, highest / 2, HALF, between, True)
+    return _below(linear, highest, highest / 2, HALF, between, True)
 
 
-def _reduced_below(
+def _below(
     linear: Matrices, highest: float, band: float, sizes: tuple[float, float], between: Between | None, lefts: bool
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """By reduced models of each part that moves by itself, so that equal modes of two planes stay in their planes; those are for a `band` (Hz), with `sizes` of what they leave out."""
+    """What these two return, left vectors (0, n) where none are asked for. Large chains by reduced models of each part that moves by itself, so that equal modes of two planes stay in their planes; those
+    are for a `band` (Hz), with `sizes` of what they leave out."""
+    n, first = len(linear.mass), 0
+    if n <= LARGE or not np.isfinite(highest):
+        whole = with_mass_between(linear, between)
+        kept = oscillating(whole, highest, stiffest_of(linear))
+        return whole.value[kept], whole.right[:, kept], whole.left[kept] if lefts else np.zeros((0, n), complex)
     parts, stiffest = [], 0.0
     for own in _apart(linear):
         grid = np.ix_(own, own)
@@ -275,7 +271,6 @@ def _reduced_below(
         stiffest = max(stiffest, small.stiffest)
     value = np.concatenate([p.value for _, _, p in parts])
     found = np.array(oscillating(Poles(value, np.zeros((0, len(value)), complex), ()), highest, stiffest), int)
-    n, first = len(linear.mass), 0
     right, left = np.zeros((n, len(found)), complex), np.zeros((len(found) if lefts else 0, n), complex)
     for own, q, p in parts:
         here = np.flatnonzero((found >= first) & (found < first + len(p.value)))

@@ -1,24 +1,16 @@
 """Imperfections: measured profiles, plausible draws from a seed, and their table in a scene file."""
 
 import copy
-import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.model.conftest import FILE
 from thermospindle.model.built.drawn import GRADES, drawn
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave, waves
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.reading import build, content_hash, load
-
-FILE = Path(__file__).parents[2] / "scenes" / "hdd_2003" / "spindle.toml"
-
-
-@pytest.fixture
-def raw():
-    return tomllib.loads(FILE.read_text(encoding="utf-8"))
 
 
 def test_waves_of_a_measured_profile():

@@ -1,30 +1,18 @@
 """Scene files: what is read, and what is refused in one sentence that names file, key, value and what is allowed."""
 
 import copy
-import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.model.conftest import FILE, named
 from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.material import Law
 from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.scene.checks import implied_clearance
 from thermospindle.model.scene.reading import build, content_hash, load
 from thermospindle.model.span import inside, temperature_range
-
-FILE = Path(__file__).parents[2] / "scenes" / "hdd_2003" / "spindle.toml"
-
-
-@pytest.fixture
-def raw():
-    return tomllib.loads(FILE.read_text(encoding="utf-8"))
-
-
-def named(entries, name):
-    return next(e for e in entries if e["name"] == name)
 
 
 def test_a_file_that_is_not_there_or_not_toml(tmp_path):

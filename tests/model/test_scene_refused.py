@@ -2,25 +2,13 @@
 
 import copy
 import re
-import tomllib
-from pathlib import Path
 
 import pytest
 
 from tests.conftest import ROOT
+from tests.model.conftest import FILE, named
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.reading import build, load
-
-FILE = Path(__file__).parents[2] / "scenes" / "hdd_2003" / "spindle.toml"
-
-
-@pytest.fixture
-def raw():
-    return tomllib.loads(FILE.read_text(encoding="utf-8"))
-
-
-def named(entries, name):
-    return next(e for e in entries if e["name"] == name)
 
 
 def region(raw, name):
