@@ -129,7 +129,7 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
                 rows.append([f"{temperature:g}", f"{speed / RPM:g}", name, *row])
     show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
     if constant:
-        console.print("The same at every temperature and speed asked for: these bearings are given by constant numbers.")
+        console.print("The same at every temperature and speed asked for.")
     rows_of_balls = any("contact_angle_deg" in values and np.isfinite(values["contact_angle_deg"]).any() for values in table.values.values())
     if table.speed.any() and rows_of_balls:
         console.print("Inner angle and force: of the contact with the inner ring; those of the outer one are in table.csv of --out.")
