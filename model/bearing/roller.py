@@ -5,6 +5,10 @@ Palmgren's 3.84e-5 Q^0.9 / L^0.8 mm a contact; Harris, Rolling Bearing Analysis,
 it holds for other moduli too. Each roller is cut into slices that respond by themselves (the lamina model of ISO/TS 16281), which gives the
 moment against tilt; its ends are taken as straight to the edge. With centred rings each roller is pressed by half the negative clearance.
 
+Rings that are displaced press some of the rollers, and which depends on where the cage stands: nobody knows that of a shaft at rest, and a turning one passes all places. Forces are those of rollers
+spread evenly over the load zone, the mean over all places of the cage (Sjovall's integral, slice by slice: Harris, ch. 7.4), smooth in the displacement; a single place has steps, for a
+roller that comes into contact is stiff at once, as d^(1/9). `with_cage_at` is such a place.
+
 Clearance follows the races and the rollers: c(T) = c0 + 2 (u_outer - u_inner) - 2 D strain_roller, u the races' radial motions. Pressed
 rollers widen the outer race and narrow the inner one: c = c(T) + g sum(Q), g the races' give, with the loads of centred rings (rings stay round).
 """
@@ -25,8 +29,17 @@ ISO_CONSTANT = 35_948.0
 """N / mm^(10/9 + 8/9), of steel."""
 STEEL = 206e9 / (2 * (1 - 0.3**2))
 """Pa: contact modulus, 1 / ((1 - nu^2) / E summed over both), of the steel for which the standard's constant holds."""
+ACROSS = [0, 1, 3, 4]
+"""Of a displacement, what moves rollers."""
 SLICES, WEIGHTS = np.polynomial.legendre.leggauss(15)
 """Places over half the length, and twice the shares of it."""
+_NODES, _SHARES = np.polynomial.legendre.leggauss(20)
+TURNS = 24
+"""Places of the cage from one roller to the next at which a row is asked how far it departs from its mean."""
+EDGE = 4
+"""Places crowd at the edge of a load zone with this power, for stiffness goes there as the ninth root: integrals to 1e-11 (`tests/model/test_roller.py`)."""
+PLACES, SHARES = 1 - ((1 - _NODES) / 2) ** EDGE, _SHARES / 2 * EDGE * ((1 - _NODES) / 2) ** (EDGE - 1)
+"""Places over half a load zone from its middle, and their shares."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +59,11 @@ class RollerRow:
 
 @dataclass(frozen=True)
 class RollerForce:
-    """Answer at one displacement: `force` (5,) N, N m needed on the outer ring, its derivative `tangent` (5, 5), loads (rows, rollers) N."""
+    """Answer at one displacement: `force` (5,) N, N m needed on the outer ring, its derivative `tangent` (5, 5), the sum of all contact loads (N)."""
 
     force: Array
     tangent: Array
-    roller_force: Array
+    load: float
 
 
 @dataclass(frozen=True)
@@ -61,6 +74,7 @@ class RollerState(LinearState):
     load: float
     contact_force: float  # N, of the most loaded roller
     row: RollerRow
+    displacement: tuple[float, ...] = (0.0,) * 5  # m, rad: of the outer ring against the inner one
 
 
 def line_constant(length: float, modulus: float = STEEL) -> float:
@@ -70,35 +84,61 @@ def line_constant(length: float, modulus: float = STEEL) -> float:
 
 
 def respond(row: RollerRow, displacement: Array | None = None) -> RollerForce:
-    """Forces and tangent at a displacement (5,) of the outer ring against the inner, order x, y, z, tilt_x, tilt_y."""
-    u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
-    c, s = np.cos(row.azimuths), np.sin(row.azimuths)
-    force, tangent, loads = np.zeros(5), np.zeros((5, 5)), []
-    for offset in row.offsets:
-        height = offset + row.length / 2 * SLICES  # (slices,)
-        outward = np.zeros((row.rollers, SLICES.size, 5))  # radial motion of the outer ring by its displacement
-        outward[:, :, 0], outward[:, :, 1] = c[:, None], s[:, None]
-        outward[:, :, 3], outward[:, :, 4] = -s[:, None] * height, c[:, None] * height
-        pressed = np.maximum(-(outward @ u) - row.clearance / 2, 0.0)
-        share = row.constant * WEIGHTS / 2
-        load = share * pressed**EXPONENT
-        slope = np.where(pressed > 0, share * EXPONENT * np.maximum(pressed, 1e-30) ** (EXPONENT - 1), 0.0)
-        force -= np.einsum("js,jsk->k", load, outward)
-        tangent += np.einsum("js,jsk,jsl->kl", slope, outward, outward)
-        loads.append(load.sum(axis=1))
-    return RollerForce(force, tangent, np.array(loads))
+    """Forces and tangent at a displacement (5,) of the outer ring against the inner, order x, y, z, tilt_x, tilt_y: the mean over all places of the cage."""
+    zones = _Zones(row, np.zeros(5) if displacement is None else np.asarray(displacement, float))
+    slope = zones.share * zones.pressed ** (EXPONENT - 1)
+    load = slope * zones.pressed
+    along = EXPONENT * np.sum(slope * zones.cosine**2, axis=1)
+    aside = EXPONENT * np.sum(slope, axis=1) - along
+    (c, s), height = zones.deepest, zones.height
+    deeper, beside = np.array([c, s, -s * height, c * height]), np.array([-s, c, -c * height, -s * height])  # radial motion of the outer ring there, and a quarter turn on
+    force, tangent = np.zeros(5), np.zeros((5, 5))
+    force[ACROSS] = -deeper @ np.sum(load * zones.cosine, axis=1)
+    tangent[np.ix_(ACROSS, ACROSS)] = (deeper * along) @ deeper.T + (beside * aside) @ beside.T
+    return RollerForce(force, tangent, float(load.sum()))
+
+
+class _Zones:
+    """The load zone of every slice of a row, at heights (slices,): where the rings press deepest, (2, slices) cosine and sine, and over half of the zone, for the other half is the same, cosines from there, what
+    rollers are pressed by (m) and the constant that they have (N/m^(10/9)), (slices, places)."""
+
+    def __init__(self, row: RollerRow, u: Array) -> None:
+        self.height = (np.array(row.offsets)[:, None] + row.length / 2 * SLICES).ravel()
+        moved = np.array([u[0] + u[4] * self.height, u[1] - u[3] * self.height])
+        far, half = np.hypot(*moved), row.clearance / 2
+        self.deepest = np.where(far > 0, -moved / np.where(far > 0, far, 1.0), [[1.0], [0.0]])
+        zone = np.arccos(np.clip(half / np.maximum(far, 1e-300), -1, 1))[:, None]  # to either side
+        self.cosine = np.cos(zone * PLACES)
+        self.pressed = np.maximum(far[:, None] * self.cosine - half, 0.0)
+        self.share = row.rollers * row.constant / 2 * np.tile(WEIGHTS, len(row.offsets))[:, None] * zone / np.pi * SHARES
+
+
+def with_cage_at(row: RollerRow, displacement: Array, turn: float) -> tuple[Array, Array, Array]:
+    """Force (5,), tangent (5, 5) and the load (rows, rollers) N of each roller at a displacement (5,), the first roller of each row `turn` rad from x."""
+    azimuth, u = row.azimuths + turn, np.asarray(displacement, float)
+    height = np.array(row.offsets)[:, None, None] + row.length / 2 * SLICES
+    outward = np.zeros((len(row.offsets), row.rollers, SLICES.size, 5))  # radial motion of the outer ring by its displacement
+    c, s = np.cos(azimuth)[:, None], np.sin(azimuth)[:, None]
+    outward[..., 0], outward[..., 1], outward[..., 3], outward[..., 4] = c, s, -s * height, c * height
+    pressed = np.maximum(-(outward @ u) - row.clearance / 2, 0.0)
+    load = row.constant * WEIGHTS / 2 * pressed**EXPONENT
+    slope = EXPONENT * load / np.where(pressed > 0, pressed, 1.0)
+    tangent = np.einsum("bjs,bjsk,bjsl->kl", slope, outward, outward)
+    return -np.einsum("bjs,bjsk->k", load, outward), tangent, load.sum(axis=2)
+
+
+def cage_spread(row: RollerRow, displacement: Array) -> float:
+    """By how much of itself the radial stiffness of a row whose rings stand at a displacement (5,) departs, at most, from its mean where the cage is at some place; 0 of one that carries nothing."""
+    mean = respond(row, displacement).tangent
+    turns = 2 * np.pi / row.rollers * np.arange(TURNS) / TURNS
+    off = [abs(with_cage_at(row, displacement, turn)[1][i, i] / mean[i, i] - 1) for turn in turns for i in (0, 1) if mean[i, i] > 0]
+    return float(max(off, default=0.0))
 
 
 def energy(row: RollerRow, displacement: Array) -> float:
-    """Elastic energy (J): sum of c d^(n + 1) / (n + 1)."""
-    c, s = np.cos(row.azimuths)[:, None], np.sin(row.azimuths)[:, None]
-    x, y, _, tilt_x, tilt_y = displacement
-    total = 0.0
-    for offset in row.offsets:
-        height = offset + row.length / 2 * SLICES
-        pressed = np.maximum(-(c * (x + tilt_y * height) + s * (y - tilt_x * height)) - row.clearance / 2, 0.0)
-        total += float((pressed ** (EXPONENT + 1) @ (WEIGHTS / 2)).sum())
-    return row.constant * total / (EXPONENT + 1)
+    """Elastic energy (J): sum of c d^(n + 1) / (n + 1), the mean over all places of the cage."""
+    zones = _Zones(row, np.asarray(displacement, float))
+    return float(np.sum(zones.share * zones.pressed ** (EXPONENT + 1))) / (EXPONENT + 1)
 
 
 def roller_row(spindle: Spindle, b: RollerBearing, motion: RingMotion | None, temperature: float) -> RollerRow:
@@ -129,8 +169,9 @@ def roller_state(spindle: Spindle, b: RollerBearing, motion: RingMotion | None, 
 
 
 def state_at(spindle: Spindle, b: RollerBearing, row: RollerRow, displacement: Array | None = None) -> RollerState:
-    """What a bearing with these rollers is, centred or at a displacement (5,) of its outer ring against its inner one."""
-    answer = respond(row, displacement)
+    """What a bearing with these rollers is, centred or at a displacement (5,) of its outer ring against its inner one; its most loaded roller stands where the rings push."""
+    u = np.zeros(5) if displacement is None else displacement
+    answer = respond(row, u)
     damping = 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * answer.tangent
-    loads = answer.roller_force
-    return RollerState(b.name, b.z, answer.tangent, damping, row.clearance, float(loads.sum()), float(loads.max()), row)
+    most = with_cage_at(row, u, float(np.arctan2(-answer.force[1], -answer.force[0])))[2].max()
+    return RollerState(b.name, b.z, answer.tangent, damping, row.clearance, answer.load, float(most), row, tuple(float(x) for x in u))

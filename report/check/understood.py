@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState
-from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.bearing.roller import RollerState, cage_spread
 from thermospindle.model.carrier import load_carrier, unbalance_carrier
 from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.rotor.modes import Mode, frf, poles
@@ -173,6 +173,7 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) 
             "pitch_diameter_mm": _mm(b.pitch_diameter),
             "clearance_um": 1e6 * state.clearance,
             "roller_force_N": state.contact_force,
+            "cage_spread": cage_spread(state.row, np.array(state.displacement)),
         }
     if isinstance(b, LinearBearing):
         table = {"temperatures_C": list(b.temperature), "speeds_rpm": [in_rpm(s) for s in b.speed]} if len(b.temperature) * len(b.speed) > 1 else None

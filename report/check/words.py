@@ -10,6 +10,9 @@ from rich.console import Console
 from thermospindle.model.errors import listed
 from thermospindle.report.text.grid import show_grid
 
+NOTABLE = 0.005
+"""Of a stiffness, from which it is worth a sentence that the place of a cage changes it."""
+
 
 def show_check(console: Console, values: Mapping[str, Any]) -> None:
     """The answer of `check` for a person: sentences, then tables of bearings, shafts and points, then what is assumed and what is odd."""
@@ -125,8 +128,13 @@ def _axial_load(values: Mapping[str, Any]) -> str:
 def _rollers(name: str, b: Mapping[str, Any]) -> str:
     rows = "a row of" if b["rows"] == 1 else f"{b['rows']} rows of"
     clear = b["clearance_um"]
-    fit = f"pressed by {-clear:.3g} um across, {b['roller_force_N']:.3g} N each" if clear < 0 else f"with {clear:.3g} um of clearance across"
-    return f"Rollers of {name}: {rows} {b['rollers']}, {b['roller_diameter_mm']:g} mm and {b['roller_length_mm']:g} mm long, {fit}; free along the axis."
+    fit = f"pressed by {-clear:.3g} um across, {b['roller_force_N']:.3g} N each" if clear < 0 else f"with {clear:.3g} um of clearance across" + (f", the most loaded with {b['roller_force_N']:.3g} N" if b["roller_force_N"] else "")
+    spread = (
+        f" Taken is the mean over all places of its cage: a shaft at rest has one of them, which is stiffer or softer across by up to {100 * b['cage_spread']:.2g}%."
+        if b["cage_spread"] > NOTABLE else ""
+    )
+    told = f"Rollers of {name}: {rows} {b['rollers']}, {b['roller_diameter_mm']:g} mm and {b['roller_length_mm']:g} mm long, {fit}; free along the axis."
+    return told + spread
 
 
 def _across(values: list[float]) -> str:
