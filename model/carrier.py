@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput, instead, listed
-from thermospindle.model.machine import Spindle
+from thermospindle.model.machine import RadialLoad, Spindle
 from thermospindle.model.shaft import SAME_HEIGHT
 from thermospindle.model.structure import Body
 
-UNBALANCE, RADIAL_LOAD = "imperfections.unbalance", "radial_load"
-"""What acts, as the keys of a scene begin that tell its height (`_z_mm`) and its part (`_body`)."""
+UNBALANCE = "imperfections.unbalance_"
+"""How the keys of a scene begin that tell the height (`z_mm`) and the part (`body`) of an unbalance; those of radial loads begin as `RadialLoad.key` says."""
 
 Spans = tuple[tuple[float, float], ...]
 
@@ -37,9 +37,9 @@ def permissible_unbalance(spindle: Spindle, body: Body, grade: float) -> float:
     return mass * grade / (spindle.nominal_speed * abs(body.speed_ratio or 1.0))
 
 
-def load_carrier(spindle: Spindle) -> Body:
-    """The same of the scene's radial load."""
-    return carrier(spindle, spindle.radial_load_z, spindle.radial_load_body, RADIAL_LOAD)
+def load_carrier(spindle: Spindle, load: RadialLoad) -> Body:
+    """The same of a radial load of the scene."""
+    return carrier(spindle, load.z, load.body, load.key)
 
 
 def carrier(spindle: Spindle, z: float, part: str, key: str) -> Body:
@@ -56,8 +56,8 @@ def only_part(spindle: Spindle, z: float, key: str) -> str:
         raise BadInput(f"{spindle.file or spindle.name}: structure: nothing turns, so there is nothing to spin; a body or shaft needs turns = true")
     found = _at(spindle, spans, z)
     if len(found) > 1:
-        told = f"{spindle.file or spindle.name}: {key}_z_mm = {z * 1e3:.6g}: {listed(found)} turn there"
-        raise BadInput(f"{told}; {key}_body must name the one it acts on: allowed are {', '.join(found)}")
+        told = f"{spindle.file or spindle.name}: {key}z_mm = {z * 1e3:.6g}: {listed(found)} turn there"
+        raise BadInput(f"{told}; {key}body must name the one it acts on: allowed are {', '.join(found)}")
     return found[0]
 
 
@@ -83,17 +83,17 @@ def named(spindle: Spindle, body: Body) -> str:
 
 
 def check_carriers(spindle: Spindle) -> None:
-    """Refuses an unbalance and a radial load whose part does not turn, is not at their height, or cannot be told."""
+    """Refuses an unbalance and radial loads whose part does not turn, is not at their height, or cannot be told."""
     own = spindle.imperfections
     for key, z, part, present in (
         (UNBALANCE, own.unbalance_z, own.unbalance_body, bool(own.unbalance or own.couple_unbalance)),
-        (RADIAL_LOAD, spindle.radial_load_z, spindle.radial_load_body, any(spindle.radial_load)),
+        *((load.key, load.z, load.body, True) for load in spindle.radial_loads),
     ):
         spans = turning_parts(spindle)
         if part and part not in spans:
-            raise BadInput(f"{spindle.file}: {key}_body = {part!r}: names nothing that turns; {instead(part, spans)}")
+            raise BadInput(f"{spindle.file}: {key}body = {part!r}: names nothing that turns; {instead(part, spans)}")
         shaft = next((s for s in spindle.structure.shafts if s.name == part), None)
         if present and shaft and not shaft.nodes[0] - SAME_HEIGHT <= z <= shaft.nodes[-1] + SAME_HEIGHT:
-            raise BadInput(f"{spindle.file}: {key}_z_mm = {z * 1e3:.6g}: beyond the shaft {part!r}, which spans {shaft.nodes[0] * 1e3:g} to {shaft.nodes[-1] * 1e3:g}")
+            raise BadInput(f"{spindle.file}: {key}z_mm = {z * 1e3:.6g}: beyond the shaft {part!r}, which spans {shaft.nodes[0] * 1e3:g} to {shaft.nodes[-1] * 1e3:g}")
         if present and spans and not part:
             only_part(spindle, z, key)

@@ -172,6 +172,21 @@ class Build:
 
 
 @dataclass(frozen=True)
+class RadialLoad:
+    """An external force (N) along x and y on what turns at a height `z` (m): on the `body` or shaft named, or on the one that the height tells (`model.carrier`); `key` begins the keys of the scene that tell it."""
+
+    force: tuple[float, float]
+    z: float
+    body: str = ""
+    key: str = field(default="radial_load_", compare=False)
+
+    @property
+    def told(self) -> str:
+        """The key of its force and the value, as the scene has it."""
+        return f"{self.key}{'force_' if self.key.endswith('.') else ''}N = [{self.force[0]:g}, {self.force[1]:g}]"
+
+
+@dataclass(frozen=True)
 class Spindle:
     name: str
     title: str
@@ -189,9 +204,8 @@ class Spindle:
     temperatures: tuple[float, float]  # C, between which it is meant to run
     ball_inertia: float = 0.0  # share of the balls' centrifugal force and gyroscopic moment in the equilibrium, 0 to 1
     axial_load: float = 0.0  # N, external axial force on what carries the outer rings, positive along z
-    radial_load: tuple[float, float] = (0.0, 0.0)  # N, external force along x and y on what turns
-    radial_load_z: float = 0.0  # m, where it acts
-    radial_load_body: str = ""  # turning body or shaft that it acts on; empty where the height tells it (`model.carrier`)
+    radial_loads: tuple[RadialLoad, ...] = ()
+    gravity: tuple[float, float] = (0.0, 0.0)  # m/s2 along x and y, on all that has mass: of a spindle that lies
     linear_bearings: tuple[LinearBearing, ...] = ()  # those given by numbers
     roller_bearings: tuple[RollerBearing, ...] = ()  # cylindrical ones, lowest first
     effects: tuple[Addition, ...] = ()
@@ -202,6 +216,11 @@ class Spindle:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name}: {len(self.all_bearings)} bearings, {len(self.structure.bodies)} bodies, {len(self.points)} points>"
+
+    @property
+    def loaded_across(self) -> bool:
+        """Whether radial loads or its weight displace its rings."""
+        return any(any(load.force) for load in self.radial_loads) or any(self.gravity)
 
     @property
     def all_bearings(self) -> tuple[Bearing | LinearBearing | RollerBearing, ...]:

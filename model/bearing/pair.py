@@ -111,11 +111,11 @@ class PairState:
 
 
 def check_centred(spindle: Spindle, state: PairState, what: str) -> None:
-    """`BadInput` where a radial load displaces rings, for `what` takes rows with centred ones."""
+    """`BadInput` where radial loads or weight displace rings, for `what` takes rows with centred ones."""
     if any(b.displacement for b in state.bearings):
-        load = ", ".join(f"{f:g}" for f in spindle.radial_load)
+        told = spindle.radial_loads[0].told if spindle.radial_loads else f"gravity_m_per_s2 = [{spindle.gravity[0]:g}, {spindle.gravity[1]:g}]"
         raise BadInput(
-            f"{spindle.file or spindle.name}: radial_load_N = [{load}]: {what} is for centred rings, and this displaces them; take it out, or ask what their stiffness decides: "
+            f"{spindle.file or spindle.name}: {told}: {what} is for centred rings, and this displaces them; take it out, or ask what their stiffness decides: "
             "modes, table, static, impact with linear elements"
         )
 

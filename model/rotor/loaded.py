@@ -1,4 +1,4 @@
-"""Bearings under an external radial load: the whole spindle in equilibrium, each row displaced and tilted as the structure lets it.
+"""Bearings under radial loads and the spindle's weight: the whole spindle in equilibrium, each row displaced and tilted as the structure lets it.
 
 Unknown are the motions u of all bodies from the preloaded state, in which everything is balanced: K u + sum over the rows of B^T (f(B u) - f(0)) = F,
 K the stiffness of joints, beams and bearings given by numbers, B the motion of a row's outer ring against its inner one, f its forces. Shares
@@ -45,12 +45,12 @@ class _Row:
 
 
 def loaded(spindle: Spindle, state: PairState) -> PairState:
-    """The state with its rows where the scene's radial load displaces them; the state itself where there is none.
+    """The state with its rows where the scene's radial loads, and the weight of a spindle that lies, displace them; the state itself where there are none.
 
     Stiffness is the tangent there, forces those of the most loaded ball or roller; bearings given by numbers bear their share and stay as stiff. Rings on a spring slide, without friction, as far as their rows
     push them. Raises `NoEquilibrium` where nothing bears the load.
     """
-    if not any(spindle.radial_load):
+    if not spindle.loaded_across:
         return state
     chain, moved = motion(spindle, state)
     balls = tuple(_displaced(spindle, b, _rows(chain, b.name) @ moved) for b in state.bearings)
@@ -59,14 +59,15 @@ def loaded(spindle: Spindle, state: PairState) -> PairState:
 
 
 def motion(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array]:
-    """The chain at a centred state, and the motion (n,) of its degrees of freedom under the scene's radial load; raises as `loaded`."""
+    """The chain at a centred state, and the motion (n,) of its degrees of freedom under the scene's radial loads and weight; raises as `loaded`."""
     chain = rotor_base(_rings_apart(spindle), state)
     rows = [_ball(chain, b) for b in state.bearings] + [_roller(chain, b) for b in state.linear if isinstance(b, RollerState)]
     own = {row.name for row in rows}
     linear = matrices(replace(chain, elements=tuple(e for e in chain.elements if e.name not in own)))
-    carrier = load_carrier(spindle)
-    load = motion_rows(chain, carrier.name, (0.0, 0.0, spindle.radial_load_z))[:2].T @ np.array(spindle.radial_load)
-    return chain, _motion(linear.stiffness, np.diag(linear.mass), rows, load, float(np.hypot(*spindle.radial_load)))
+    forces = [(load_carrier(spindle, load).name, load.z, np.array(load.force)) for load in spindle.radial_loads]
+    forces += [(b.name, b.z, b.mass * np.array(spindle.gravity)) for b in chain.bodies if any(spindle.gravity)]
+    load = sum((motion_rows(chain, body, (0.0, 0.0, z))[:2].T @ force for body, z, force in forces), start=np.zeros(len(linear.mass)))
+    return chain, _motion(linear.stiffness, np.diag(linear.mass), rows, load, sum(float(np.hypot(*force)) for _, _, force in forces))
 
 
 def _rings_apart(spindle: Spindle) -> Spindle:
@@ -113,7 +114,7 @@ def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, si
     firm = stiffness + sum((row.b.T @ (np.trace(stiffness) / len(mass) * row.b) for row in rows), start=np.zeros_like(stiffness))
     held = firmly(firm, load)
     if held is None:
-        raise NoEquilibrium("nothing bears the radial load: the spindle is free to move under it")
+        raise NoEquilibrium("nothing bears the load across the axis: the spindle is free to move under it")
     unit = 1e-6 * np.sqrt(np.median(mass) / mass)
     pushed = np.linalg.solve(held, np.column_stack([load, *(row.b.T for row in rows)])) / unit[:, None]
     basis = unit[:, None] * np.linalg.qr(pushed / np.maximum(np.linalg.norm(pushed, axis=0), 1e-300))[0]
@@ -123,7 +124,7 @@ def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, si
         start = _least(structure, rows, 1e-6 * size)
     found = _balanced(structure, [row.answer for row in rows], start)
     if found is None:
-        raise NoEquilibrium(f"the bearings find no balance under a radial load of {size:g} N")
+        raise NoEquilibrium(f"the bearings find no balance under {size:.6g} N across the axis")
     return np.asarray(basis @ found)
 
 

@@ -80,9 +80,11 @@ Span = Annotated[tuple[Place, Place], Strict(False), AfterValidator(_rising)]
 Radii = Annotated[tuple[Radius, Place], Strict(False), AfterValidator(_rising)]
 Band = Annotated[tuple[NotNegative, Positive], Strict(False), AfterValidator(_rising)]
 """Hz."""
+Accel = Annotated[float, Field(ge=-20.0, le=20.0)]  # m/s2, to twice the earth's: a larger one is of another unit
 TemperatureSpan = Annotated[tuple[Temperature, Temperature], Strict(False), AfterValidator(_rising)]
 Both = Annotated[tuple[NotNegative, NotNegative], Strict(False)]
 Pair = Annotated[tuple[Finite, Finite], Strict(False)]
+Gravity = Annotated[tuple[Accel, Accel], Strict(False)]
 Position = Annotated[tuple[Place, Place, Place], Strict(False)]
 TwoNames = Annotated[tuple[str, str], Strict(False)]
 

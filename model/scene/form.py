@@ -20,6 +20,7 @@ from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, Be
 from thermospindle.model.scene.defaults import GENTLE, WARMER, assumed
 from thermospindle.model.scene.fields import (
     Finite,
+    Gravity,
     Name,
     NotNegative,
     Pair,
@@ -72,6 +73,15 @@ class Effect(Table):
     values: dict[str, Finite] = Field(default_factory=dict)
 
 
+class RadialLoad(Table):
+    force_N: Pair
+    z_mm: Place
+    body: str | None = None
+
+    def load(self, number: int) -> m.RadialLoad:
+        return m.RadialLoad(self.force_N, self.z_mm * MM, self.body or "", f"radial_loads.{number}.")
+
+
 class Build(Table):
     deviations: dict[str, Annotated[float, Field(ge=LEAST, le=MOST)]] = Field(min_length=1)
     tests: list[str] = Field(default_factory=list)
@@ -110,6 +120,8 @@ class Scene(Table):
     radial_load_N: Pair = (0.0, 0.0)
     radial_load_z_mm: Place | None = None
     radial_load_body: str | None = None
+    radial_loads: list[RadialLoad] = Field(default_factory=list)
+    gravity_m_per_s2: Gravity = (0.0, 0.0)
     structure: Structure
     shafts: list[ShaftForm] = Field(default_factory=list)
     thermal: Thermal = Thermal()
@@ -148,9 +160,14 @@ class Scene(Table):
         if any(self.radial_load_N) and self.radial_load_z_mm is None:
             raise ValueError("radial_load_z_mm is missing: the height at which radial_load_N acts on what turns")
         turns = [*(s.turns for s in self.shafts), *(b.turns for b in self.structure.bodies)]
-        if any(self.radial_load_N) and not any(turns):
-            raise ValueError("radial_load_N: nothing turns that it could act on; a body or shaft needs turns = true")
+        if not any(turns) and (loads := self._radial_loads()):
+            raise ValueError(f"{loads[0].told}: nothing turns that it could act on; a body or shaft needs turns = true")
         return self
+
+    def _radial_loads(self) -> tuple[m.RadialLoad, ...]:
+        """All that are not nothing."""
+        single = m.RadialLoad(self.radial_load_N, (self.radial_load_z_mm or 0.0) * MM, self.radial_load_body or "")
+        return tuple(load for load in (single, *(load.load(k) for k, load in enumerate(self.radial_loads, 1))) if any(load.force))
 
     @model_validator(mode="after")
     def _ball_inertia_told_once(self) -> Scene:
@@ -256,9 +273,8 @@ class Scene(Table):
             temperatures=self.temperature_range_C or (reference, reference + WARMER),
             ball_inertia=pair.ball_inertia if pair is not None else self.ball_inertia if self.ball_inertia is not None else 1.0,
             axial_load=self.axial_load_N,
-            radial_load=self.radial_load_N,
-            radial_load_z=(self.radial_load_z_mm or 0.0) * MM,
-            radial_load_body=self.radial_load_body or "",
+            radial_loads=self._radial_loads(),
+            gravity=self.gravity_m_per_s2,
             linear_bearings=tuple(sorted(linear, key=lambda b: b.z)),
             roller_bearings=tuple(sorted(rollers, key=lambda b: b.z)),
             effects=tuple(m.Addition(effect=e.name, values=dict(e.values)) for e in self.effects),

@@ -166,14 +166,13 @@ def content_hash(spindle: Spindle) -> str:
     content = _compared(spindle)
     for key in ("name", "title", "provenance"):
         content.pop(key)
-    if not any(content["radial_load"]):  # what came later counts where there is any
-        content.pop("radial_load")
-        content.pop("radial_load_z")
-    for table, key in ((content, "radial_load_body"), (content["imperfections"], "unbalance_body")):
-        if not table[key]:
-            table.pop(key)
-    if not content["roller_bearings"]:
-        content.pop("roller_bearings")
+    for key in ("radial_loads", "roller_bearings"):  # what came later counts where there is any
+        if not content[key]:
+            content.pop(key)
+    if not any(content["gravity"]):
+        content.pop("gravity")
+    if not content["imperfections"]["unbalance_body"]:
+        content["imperfections"].pop("unbalance_body")
     for film in content["thermal"]["convections"]:
         if film["coolant"] is None:
             film.pop("coolant")
@@ -216,7 +215,7 @@ def _provenance(file: Path, raw: Mapping[str, Any]) -> dict[str, Provenance]:
         elif isinstance(node, list) and node and isinstance(node[0], list):
             walk(node[0], key, origin, source)
         elif _is_number(node) or (isinstance(node, list) and node and all(map(_is_number, node))):
-            if key in (KEY, "reference_temperature_C", "nominal_speed_rpm", "temperature_range_C", "ball_inertia", "axial_load_N", "radial_load_N", "radial_load_z_mm") or key.endswith(".node"):
+            if key in (KEY, "reference_temperature_C", "nominal_speed_rpm", "temperature_range_C", "ball_inertia", "axial_load_N", "radial_load_N", "radial_load_z_mm", "gravity_m_per_s2") or key.startswith("radial_loads.") or key.endswith(".node"):
                 return
             if origin is None:
                 raise BadInput(f"{file}: {key} = {node!r}: says no origin; its table needs origin = printed, assumed or calibrated")

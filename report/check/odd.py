@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.forward.linear import mass_between
-from thermospindle.model.carrier import RADIAL_LOAD, UNBALANCE, load_carrier, turning_parts, unbalanced
+from thermospindle.model.carrier import UNBALANCE, load_carrier, turning_parts, unbalanced
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import PARTS, Point, Spindle
 from thermospindle.model.rotor.modes import lost_to_rounding, poles_below
@@ -278,19 +278,18 @@ def _running(found: Looked) -> Iterator[str]:
 def _planes(found: Looked) -> Iterator[str]:
     """An unbalance or a radial load at a height at which the part it acts on is not."""
     spindle, own = found.spindle, found.spindle.imperfections
-    for key, z, told, carrier in (
-        (UNBALANCE, own.unbalance_z, own.unbalance or own.couple_unbalance, unbalanced),
-        (RADIAL_LOAD, spindle.radial_load_z, any(spindle.radial_load), load_carrier),
-    ):
-        if not told or not spindle.structure.turns:
-            continue
-        body = carrier(spindle)
+    if not spindle.structure.turns:
+        return
+    planes = [(load.key, load.z, load_carrier(spindle, load)) for load in spindle.radial_loads]
+    if own.unbalance or own.couple_unbalance:
+        planes.insert(0, (UNBALANCE, own.unbalance_z, unbalanced(spindle)))
+    for key, z, body in planes:
         part = spindle.structure.carrier(body.name)
         reach = 0.0 if body.regions or part != body.name else FAR * np.sqrt(max(body.inertia[:2]) / body.mass)
         low, high = (pick(ends) for pick, ends in zip((min, max), zip(*turning_parts(spindle)[part], strict=True), strict=True))
         if max(low - z, z - high) > reach + SAME_HEIGHT:
             what = f"whose centre of mass is at {low / MM:g}" if low == high else f"which spans {low / MM:g} to {high / MM:g}"
-            yield f"{key}_z_mm = {z / MM:g}: lies beyond {part!r}, on which it acts, {what}"
+            yield f"{key}z_mm = {z / MM:g}: lies beyond {part!r}, on which it acts, {what}"
 
 
 def _effects(found: Looked) -> Iterator[str]:

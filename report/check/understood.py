@@ -34,6 +34,7 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
     structure, own = spindle.structure, spindle.imperfections
     plain = structure.rigid_bodies
     refused = {e.name: why for e in catalogue if (why := refusal(e, spindle))}
+    alone = spindle.radial_loads[0] if len(spindle.radial_loads) == 1 else None
     return {
         "scene": spindle.name,
         "title": spindle.title,
@@ -41,9 +42,13 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
         "temperature_range_C": list(spindle.temperatures),
         "nominal_speed_rpm": in_rpm(spindle.nominal_speed),
         "axial_load_N": spindle.axial_load,
-        "radial_load_N": list(spindle.radial_load),
-        "radial_load_z_mm": _mm(spindle.radial_load_z) if any(spindle.radial_load) else None,
-        "radial_load_body": structure.carrier(load_carrier(spindle).name) if any(spindle.radial_load) else None,
+        "radial_load_N": np.sum([load.force for load in spindle.radial_loads], axis=0).tolist() if spindle.radial_loads else [0.0, 0.0],
+        "radial_load_z_mm": _mm(alone.z) if alone else None,
+        "radial_load_body": structure.carrier(load_carrier(spindle, alone).name) if alone else None,
+        "radial_loads": [
+            {"force_N": list(load.force), "z_mm": _mm(load.z), "body": structure.carrier(load_carrier(spindle, load).name)} for load in spindle.radial_loads
+        ],
+        "gravity_m_per_s2": list(spindle.gravity),
         "unbalance_body": structure.carrier(unbalance_carrier(spindle, own).name) if own.unbalance or own.couple_unbalance else None,
         "ball_inertia": spindle.ball_inertia,
         "parts": {

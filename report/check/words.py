@@ -43,14 +43,7 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     found += [_rollers(name, b) for name, b in values["bearings"].items() if b["kind"] == "roller row"]
     if values["axial_load_N"]:
         found.append(_axial_load(values))
-    if any(values["radial_load_N"]):
-        shares = [f"{name} {f[0]:+.3g}, {f[1]:+.3g}" for name, b in values["bearings"].items() if (f := b["radial_force_N"])]
-        fx, fy = values["radial_load_N"]
-        on = f" on {values['radial_load_body']}" if len(turning) > 1 else ""
-        borne = f"{'; '.join(shares)} N" if shares else "joints alone"
-        numbers = [name for name, b in values["bearings"].items() if b["kind"] == "numbers"]
-        alike = f"; {listed(numbers)}, given by numbers, {'is' if len(numbers) == 1 else 'are'} as stiff under any load" if numbers else ""
-        found.append(f"External radial load {fx:g}, {fy:g} N along x, y at z = {values['radial_load_z_mm']:g} mm{on}, borne by {borne}{alike}.")
+    found += _across(values, len(turning) > 1)
     if values["unbalance_body"] and len(turning) > 1:
         found.append(f"The unbalance is on {values['unbalance_body']}.")
     h, modes = values["hammer"], values["modes_Hz"]
@@ -99,7 +92,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
         for name, b in values["bodies"].items()
     ]
     joints = [
-        [name, " - ".join(j["between"]), f"{j['z_mm']:g}", *(_across(k) for k in (j["stiffness"][:2], j["stiffness"][2:3], j["stiffness"][3:]))]
+        [name, " - ".join(j["between"]), f"{j['z_mm']:g}", *(_by_way(k) for k in (j["stiffness"][:2], j["stiffness"][2:3], j["stiffness"][3:]))]
         for name, j in values["joints"].items()
     ]
     points = [
@@ -125,6 +118,20 @@ def _axial_load(values: Mapping[str, Any]) -> str:
     return f"External axial load {load:g} N along z on {outer}, which carries the outer rings: for the bearings the same as {-load:g} N on {inner}."
 
 
+def _across(values: Mapping[str, Any], several: bool) -> list[str]:
+    """The radial loads and the weight, and who bears them."""
+    loads = [f"{own['force_N'][0]:g}, {own['force_N'][1]:g} N along x, y at z = {own['z_mm']:g} mm" + f" on {own['body']}" * several for own in values["radial_loads"]]
+    gx, gy = values["gravity_m_per_s2"]
+    weight = f"weight under {gx:g}, {gy:g} m/s2 along x, y" if gx or gy else ""
+    if not loads and not weight:
+        return []
+    shares = [f"{name} {f[0]:+.3g}, {f[1]:+.3g}" for name, b in values["bearings"].items() if (f := b["radial_force_N"])]
+    numbers = [name for name, b in values["bearings"].items() if b["kind"] == "numbers"]
+    alike = f"; {listed(numbers)}, given by numbers, {'is' if len(numbers) == 1 else 'are'} as stiff under any load" if numbers else ""
+    what = f"External radial load{'s' * (len(loads) > 1)} {'; '.join(loads)}" + f", and {weight}" * bool(weight) if loads else weight.capitalize()
+    return [f"{what}, borne by {'; '.join(shares) + ' N' if shares else 'joints alone'}{alike}."]
+
+
 def _rollers(name: str, b: Mapping[str, Any]) -> str:
     rows = "a row of" if b["rows"] == 1 else f"{b['rows']} rows of"
     clear = b["clearance_um"]
@@ -137,7 +144,7 @@ def _rollers(name: str, b: Mapping[str, Any]) -> str:
     return told + spread
 
 
-def _across(values: list[float]) -> str:
+def _by_way(values: list[float]) -> str:
     """Stiffness along or about x and y, once where they are the same."""
     shown = [f"{k:.3g}" if k else "-" for k in values]
     return shown[0] if len(set(shown)) == 1 else ", ".join(shown)

@@ -146,7 +146,7 @@ def _decimals(sd: float, least: int) -> int:
 
 def show_run(console: Console, run: Run, out: Path) -> None:
     temperatures = [s.point.condition.temperature for s in run.steps]
-    show_table(console, stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]), any(run.spindle.radial_load))
+    show_table(console, stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]), run.spindle.loaded_across)
     console.print()
     highest = run.spindle.hammer.band[1]
     numbers, beside = numbered(run), measured_rows(run)

@@ -44,7 +44,7 @@ def table(
     conditions = [Condition(t, s * RPM) for t in steps for s in speeds_rpm]
     return answered(
         text.table_json(found),
-        lambda console: text.show_told_table(console, found, any(spindle.radial_load)),
+        lambda console: text.show_told_table(console, found, spindle.loaded_across),
         out,
         {"verb": "table"} | asked,
         lambda folder, _: write_table(found, folder / "table.csv"),

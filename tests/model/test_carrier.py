@@ -13,7 +13,7 @@ from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.carrier import permissible_unbalance, unbalance_carrier
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.machine import Condition, RadialLoad, Spindle
 from thermospindle.model.rotor.loaded import motion
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.units import RPM
@@ -211,7 +211,9 @@ def test_a_name_counts_in_a_scenes_hash_and_none_does_not(made):
     plain = made(50.0)
     own = plain.imperfections
     assert content_hash(replace(plain, imperfections=replace(own, unbalance_body="shaft"))) != content_hash(plain)
-    assert content_hash(replace(plain, radial_load_body="shaft")) != content_hash(plain)
+    load = RadialLoad((1.0, 0.0), 0.05)
+    by_height, by_name = (replace(plain, radial_loads=(replace(load, body=body),)) for body in ("", "shaft"))
+    assert len({content_hash(s) for s in (plain, by_height, by_name, replace(plain, gravity=(0.0, -9.81)))}) == 4
 
 
 def test_check_tells_which_part_it_took(made, capsys):

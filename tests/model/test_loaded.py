@@ -15,7 +15,7 @@ from thermospindle.model.bearing.roller import EXPONENT, RollerState, line_const
 from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.carrier import load_carrier
 from thermospindle.model.errors import BadInput, NoEquilibrium
-from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.machine import Condition, RadialLoad, Spindle
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import matrices, motion_rows, point_row, rotor_base
 from thermospindle.model.rotor.loaded import loaded, motion
@@ -43,7 +43,7 @@ def five() -> Spindle:
 
 def under(spindle: Spindle, force: tuple[float, float], z: float, speed: float = 0.0):
     """The state at the reference temperature under a radial load at a height."""
-    pushed = replace(spindle, radial_load=force, radial_load_z=z)
+    pushed = replace(spindle, radial_loads=(RadialLoad(force, z),))
     still = {b.name: reference_motion(spindle.reference_temperature) for b in spindle.ringed}
     return pushed, loaded(pushed, solve(pushed, Condition(spindle.reference_temperature, speed), still))
 
@@ -64,6 +64,33 @@ def test_forces_and_moments_balance(pair: Spindle) -> None:
     assert about_x == pytest.approx(-z * force[1], rel=1e-6)
     assert about_y == pytest.approx(z * force[0], rel=1e-6)
     assert sum(f[2] for f in held) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_two_loads_are_the_one_of_their_forces_and_moments(pair: Spindle, five: Spindle) -> None:
+    """On one rigid body."""
+    one, two = ((RadialLoad((3.0, -1.0), 0.025),), (RadialLoad((1.0, -1.0), 0.025), RadialLoad((3.0, 0.0), 0.05), RadialLoad((-1.0, 0.0), 0.1)))
+    still = {b.name: reference_motion(pair.reference_temperature) for b in pair.ringed}
+    state = solve(pair, Condition(pair.reference_temperature), still)
+    first, second = (loaded(replace(pair, radial_loads=loads), state) for loads in (one, two))
+    assert shares(second) == pytest.approx(shares(first), rel=1e-9)
+
+
+@pytest.mark.parametrize("scene", ["pair", "five"])
+def test_weight_is_borne_by_the_rows_of_what_turns(scene: str, request: pytest.FixtureRequest) -> None:
+    """Each mass where it is: forces on the outer rings add up to the weight of what the rows carry, and their moment is that of its centre of mass. It is far below the preload, so a second g adds as much."""
+    spindle = request.getfixturevalue(scene)
+    still = {b.name: reference_motion(spindle.reference_temperature) for b in spindle.ringed}
+    state = solve(spindle, Condition(spindle.reference_temperature), still)
+    outside = {b.outer_body for b in spindle.bearings}
+    carried = [b for b in spindle.structure.bodies if b.turns]
+    sign = 1.0 if outside <= {b.name for b in carried} else -1.0  # the force on the outer ring bears what hangs on it, or is what it bears of the inner one
+    under_g, under_2g = (loaded(replace(spindle, gravity=(0.0, -g)), state) for g in (9.81, 19.62))
+    weight = 9.81 * sum(b.mass for b in carried)
+    assert sign * shares(under_g).sum(axis=0) == pytest.approx([0.0, -weight], rel=1e-6, abs=1e-9)
+    held = [respond(b.row, np.array(b.displacement)).force for b in under_g.bearings]
+    about_x = sum(f[3] - b.z * f[1] for f, b in zip(held, under_g.bearings, strict=True))
+    assert sign * about_x == pytest.approx(9.81 * sum(b.mass * b.z for b in carried), rel=1e-6)
+    assert shares(under_2g) == pytest.approx(2 * shares(under_g), rel=0.01, abs=1e-3 * weight)
 
 
 def test_a_preload_that_a_load_turns_round_is_less_than_nothing(pair: Spindle) -> None:
@@ -132,7 +159,7 @@ def test_stiffness_is_the_derivative_of_the_motion(five: Spindle, speed: float) 
 
 def _nose(five: Spindle, force: float, speed: float) -> float:
     """Motion (m) of the nose."""
-    pushed = replace(five, radial_load=(force, 0.0), radial_load_z=0.0)
+    pushed = replace(five, radial_loads=(RadialLoad((force, 0.0), 0.0),))
     still = {b.name: reference_motion(20.0) for b in five.ringed}
     chain, moved = motion(pushed, solve(pushed, Condition(20.0, speed), still))
     return float(point_row(chain, next(p for p in five.points if p.name == "nose")) @ moved)
@@ -184,12 +211,12 @@ def test_stiffness_behind_a_spring_is_the_derivative_of_the_motion(mass: float) 
     point = next(p for p in spindle.points if p.direction == (1.0, 0.0, 0.0))
     moved = []
     for more in (-step, step):
-        pushed = replace(spindle, radial_load=(20.0 + more, 0.0), radial_load_z=point.position[2])
+        pushed = replace(spindle, radial_loads=(RadialLoad((20.0 + more, 0.0), point.position[2]),))
         chain, u = motion(pushed, solve(pushed, Condition(20.0), {b.name: reference_motion(20.0) for b in pushed.ringed}))
         moved.append(float(point_row(chain, point) @ u))
     pushed, state = under(spindle, (20.0, 0.0), point.position[2])
     chain, z = rotor_base(pushed, state), point.position[2]
-    load = motion_rows(chain, load_carrier(pushed).name, (0.0, 0.0, z))[0]
+    load = motion_rows(chain, load_carrier(pushed, pushed.radial_loads[0]).name, (0.0, 0.0, z))[0]
     compliance = float(point_row(chain, point) @ np.linalg.solve(matrices(chain).stiffness, load))
     assert (moved[1] - moved[0]) / (2 * step) == pytest.approx(compliance, rel=2e-3)
 
@@ -230,7 +257,7 @@ def test_loose_rollers_are_pressed_by_the_load() -> None:
 def test_balls_that_a_load_brings_into_contact_are_damped_as_any() -> None:
     """Found by `make torture`: rows without contact before the load have no stiffness to take the damping's share from."""
     file = ROOT / "scenes" / "tailstock" / "spindle.toml"
-    spindle = replace(build(raw_of(file), file), radial_load=(0.0, 7000.0), radial_load_z=0.0)
+    spindle = replace(build(raw_of(file), file), radial_loads=(RadialLoad((0.0, 7000.0), 0.0),))
     apart = {b.name: replace(reference_motion(spindle.reference_temperature), outer_r=40e-6 * (b.name in {r.name for r in spindle.bearings})) for b in spindle.ringed}
     before = solve(spindle, Condition(spindle.reference_temperature, 0.0), apart)
     assert any(not np.any(b.stiffness) for b in before.bearings)
@@ -243,7 +270,7 @@ def test_balls_that_a_load_brings_into_contact_are_damped_as_any() -> None:
 def test_a_load_that_nothing_bears_is_refused() -> None:
     spindle = rollers()
     free = replace(spindle, roller_bearings=(), linear_bearings=spindle.linear_bearings)
-    with pytest.raises(NoEquilibrium, match="nothing bears the radial load"):
+    with pytest.raises(NoEquilibrium, match="nothing bears the load across the axis"):
         under(free, (1.0, 0.0), 0.0)
 
 

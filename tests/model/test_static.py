@@ -16,7 +16,7 @@ from tests.sim.running.test_two_rotors import TEXT as TWO_ROTORS
 from thermospindle.cli import main
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.row import reference_motion
-from thermospindle.model.machine import Condition
+from thermospindle.model.machine import Condition, RadialLoad
 from thermospindle.model.rotor.chain import motion_rows, rotor_base
 from thermospindle.model.rotor.loaded import loaded, motion
 from thermospindle.model.rotor.static import around
@@ -100,12 +100,12 @@ def test_across_a_radial_load_a_little_more_load_moves_the_nose_by_the_complianc
     file = ROOT / "scenes" / "five_bearing" / "spindle.toml"
     spindle = build(tomllib.loads(file.read_text(encoding="utf-8")), file)
     nose = next(p for p in spindle.points if p.name == "nose")
-    pushed = replace(spindle, radial_load=(2000.0, 0.0), radial_load_z=nose.position[2])
+    pushed = replace(spindle, radial_loads=(RadialLoad((2000.0, 0.0), nose.position[2]),))
     still = {b.name: reference_motion(spindle.reference_temperature) for b in spindle.ringed}
     state = solve(pushed, Condition(spindle.reference_temperature), still)
     found = around(pushed, rotor_base(pushed, loaded(pushed, state)), nose)
     assert found.across is not None
-    moved = [motion(replace(pushed, radial_load=(2000.0, y)), state) for y in (-1.0, 1.0)]
+    moved = [motion(replace(pushed, radial_loads=(RadialLoad((2000.0, y), nose.position[2]),)), state) for y in (-1.0, 1.0)]
     chain = moved[0][0]
     y = motion_rows(chain, nose.body, nose.position)[1]
     assert float(y @ (moved[1][1] - moved[0][1]) / 2) == pytest.approx(1 / found.across.stiffness, rel=1e-5)

@@ -165,6 +165,29 @@ def test_columns_with_dashes_are_of_numbers_and_an_empty_list_says_so(tmp_path: 
     assert "Assumed, where the scene says nothing:\n  - nothing" in capsys.readouterr().out
 
 
+def test_several_loads_and_the_weight_of_a_spindle_that_lies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    loads = "gravity_m_per_s2 = [0.0, -9.81]\nradial_load_N = [300.0, -100.0]\nradial_load_z_mm = 0.0\n"
+    belt = "[[radial_loads]]\nforce_N = [0.0, 250.0]\nz_mm = 400.0\n\n[materials"
+    text = SCENES["five_bearing"].read_text(encoding="utf-8").replace("ball_inertia = 1.0", f"ball_inertia = 1.0\n{loads}").replace("[materials", belt, 1)
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    found = checked(tmp_path, capsys)
+    assert [load["force_N"] for load in found["radial_loads"]] == [[300.0, -100.0], [0.0, 250.0]]
+    assert (found["radial_load_N"], found["radial_load_z_mm"], found["gravity_m_per_s2"]) == ([300.0, 150.0], None, [0.0, -9.81])
+    borne = np.sum([b["radial_force_N"] for b in found["bearings"].values()], axis=0)
+    assert borne == pytest.approx([300.0, 150.0 - 9.81 * found["turning_mass_kg"]], rel=1e-6)
+    assert main(["check", str(tmp_path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "External radial loads 300, -100 N along x, y at z = 0 mm; 0, 250 N along x, y at z = 400 mm, and weight under 0, -9.81 m/s2 along x, y, borne by front1 " in said
+    for wrong, why in (
+        (text.replace("-9.81", "-9810.0"), "gravity_m_per_s2.2 = -9810.0: input should be greater than or equal to -20"),
+        (text.replace("z_mm = 400.0\n\n[mat", "\n[mat"), "radial_loads.1.z_mm: missing, and has no default"),
+        (text.replace("z_mm = 400.0\n\n[mat", 'z_mm = 400.0\nbody = "housing"\n\n[mat'), "radial_loads.1.body = 'housing': names nothing that turns"),
+    ):
+        (tmp_path / "spindle.toml").write_text(wrong, encoding="utf-8")
+        assert main(["check", str(tmp_path)]) == 2
+        assert f"{tmp_path / 'spindle.toml'}: {why}" in capsys.readouterr().err
+
+
 def test_shares_of_a_radial_load_add_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = SCENES["five_bearing"].read_text(encoding="utf-8").replace("ball_inertia = 1.0", "ball_inertia = 1.0\nradial_load_N = [300.0, -100.0]\nradial_load_z_mm = 0.0")
     (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")

@@ -7,7 +7,7 @@ import pytest
 
 from thermospindle.model.bearing.row import reference_motion, relative_speed
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import Condition, Friction
+from thermospindle.model.machine import Condition, Friction, RadialLoad
 from thermospindle.model.material import Law, Viscosity
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.bearing import lubricant_film, ring_growth
@@ -58,7 +58,7 @@ def test_load_of_a_row(spindle):
     assert load(b, 0.0, 50.0) == 50.0
     rest = loads(spindle)
     assert rest == pytest.approx({name: load(b, 16.0) for name in ("lower", "upper")})
-    state = operating_point(replace(spindle, radial_load=(30.0, 40.0), radial_load_z=0.0), Condition(20.0)).state
+    state = operating_point(replace(spindle, radial_loads=(RadialLoad((30.0, 40.0), 0.0),)), Condition(20.0)).state
     borne = loads(spindle, state)
     for row in state.bearings:
         assert borne[row.name] == pytest.approx(load(b, row.preload, np.hypot(*row.radial_force)))

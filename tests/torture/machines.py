@@ -109,7 +109,9 @@ def loads(draw, name):
     """Forces from outside, from a touch to what no bearing bears."""
     size = draw(st.sampled_from([0.1, 3.0, 30.0, 300.0, 1e4]))
     force = _f(-size, size)
-    return (("axial_load_N",), draw(force)), (("radial_load_N",), [draw(force), draw(force)]), (("radial_load_z_mm",), draw(_f(*heights(name))))
+    single = (("axial_load_N",), draw(force)), (("radial_load_N",), [draw(force), draw(force)]), (("radial_load_z_mm",), draw(_f(*heights(name))))
+    more = [{"force_N": [draw(force), draw(force)], "z_mm": draw(_f(*heights(name)))} for _ in range(draw(st.integers(0, 2)))]
+    return *single, (("radial_loads",), more), (("gravity_m_per_s2",), [draw(st.sampled_from([0.0, -9.81, 20.0])) for _ in "xy"])
 
 
 @st.composite
