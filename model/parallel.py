@@ -42,6 +42,7 @@ ENVIRONMENT = {
 _last: tuple[int, float] = (0, 0.0)  # how many workers were last at work, until when
 _inside = False  # this process is a worker
 _watcher: Callable[[int, int], object] | None = None  # who is told how many items are done, and of how many
+_keeper: Callable[[int], tuple[list[Any], Callable[[Any], object]]] | None = None  # who keeps results: of so many items those that are known, and what takes a further one
 
 
 def cores() -> int:
@@ -70,19 +71,40 @@ def in_parallel(
     """
     waiting, results = list(items), list[Result]()
     count = len(waiting)
+    known, keep = _keeper(count) if _keeper is not None and not _inside else ([], lambda result: None)
+
+    def finished(result: Result) -> None:
+        results.append(result)
+        done(result)
+        _tell(len(results), count)
+
+    for result in known:
+        finished(result)
+    del waiting[: len(known)]
     workers = min(workers or cores(), len(waiting))
     patience = 0.0 if _running(workers) else START
     began = time.perf_counter()
     while waiting and (workers < 2 or _inside or len(waiting) == 1 or time.perf_counter() - began < patience):
-        results.append(function(waiting.pop(0)))
-        done(results[-1])
-        _tell(len(results), count)
+        with keeping(None):  # what is parallel within it is so only here
+            result = function(waiting.pop(0))
+        keep(result)
+        finished(result)
     if waiting:
         for result in _sent(function, waiting, workers):
-            results.append(result)
-            done(result)
-            _tell(len(results), count)
+            keep(result)
+            finished(result)
     return results
+
+
+@contextmanager
+def keeping(keeper: Callable[[int], tuple[list[Any], Callable[[Any], object]]] | None) -> Iterator[None]:
+    """Within it every call of `in_parallel` asks `keeper`, by how many items it has, for the first results if they are known, and for what takes each further one, in order."""
+    global _keeper
+    before, _keeper = _keeper, keeper
+    try:
+        yield
+    finally:
+        _keeper = before
 
 
 @contextmanager

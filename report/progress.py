@@ -6,14 +6,17 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from thermospindle.model.errors import visible
-from thermospindle.model.parallel import watched
+from thermospindle.model.files import unfinished
+from thermospindle.model.parallel import packed, watched
 
 FIRST, EVERY = 10.0, 30.0
 """s before the first plain line, and between one and the next: short work says nothing."""
@@ -45,9 +48,21 @@ def progress_bar(steps: int | Sequence[float]) -> Iterator[Callable[[str], None]
 
 def hint(words: str) -> None:
     """Says before long work what is quicker."""
+    say(f"hint: {words}")
+
+
+def going_on(asked: Mapping[str, Any], *read: object) -> AbstractContextManager[None]:
+    """Within it what is computed in parallel of long work is kept as it comes: the same `asked` of a verb, of what it has `read`, goes on from where it was stopped."""
+    effects = [Path(file).read_bytes() for file in asked["effect_files"]]
+    options = sorted((key, repr(value)) for key, value in asked.items() if key not in ("effect_files", "out", "verbose"))
+    return unfinished.going_on(packed((read, effects, options)), say)
+
+
+def say(words: str) -> None:
+    """A line on standard error."""
     if sys.stderr is not None:
         with suppress(OSError, ValueError):
-            print(f"spindle: hint: {visible(words)}", file=sys.stderr, flush=True)
+            print(f"spindle: {visible(words)}", file=sys.stderr, flush=True)
 
 
 @contextmanager

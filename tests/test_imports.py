@@ -18,7 +18,7 @@ ONLY_IN = {
     "pyuff": lambda f: f == Path("sim/campaign/uff.py"),
     "bokeh": lambda f: f.parts[:2] == ("report", "workbench"),
     "tornado": lambda f: f.parts[:2] == ("report", "workbench"),
-    "pyarrow": lambda f: f.parts[:2] == ("sim", "study") or f.parts[0] == "report" or f == Path("diagnosis/fleet.py"),
+    "pyarrow": lambda f: f.parts[:2] == ("sim", "study") or f.parts[0] == "report" or f in (Path("diagnosis/fleet.py"), Path("model/files/unfinished.py")),
     "distributed": lambda f: f == Path("sim/study/executors.py"),
     "matplotlib": lambda f: f.parts[0] == "report",
 }

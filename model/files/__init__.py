@@ -7,6 +7,7 @@ formats          the format that a file is written in, and how an older one beco
 kept             results kept on disk between runs, the user's own alone
 stiffness_table  the stiffness table: bearing properties over temperature and speed, as a CSV with units in its header
                  and its provenance above
+unfinished       what long work that was stopped had computed, kept for the next time it is asked for
 whole            files and folders that are written whole or not at all
 ===============  ====================================================================================================
 """

@@ -22,7 +22,7 @@ from thermospindle.model.files.formats import CURRENT, DIAGNOSIS, KEY
 from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash
-from thermospindle.report.progress import progress_bar
+from thermospindle.report.progress import going_on, progress_bar
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
@@ -61,7 +61,7 @@ def diagnose(
             _write(None, answer, spindle, folder, of_runout, answer, name=whole.name)
 
         return answered(told | where, show_runout, out, asked, alone, doubtful(spindle, whole))
-    with progress_bar([*[1.0] * len(tests.tests), *verdict.STEPS]) as progress:
+    with going_on(asked, spindle, whole), progress_bar([*[1.0] * len(tests.tests), *verdict.STEPS]) as progress:
         found = verdict.diagnose(spindle, tests, catalogue, progress)
     values = diagnosis_json(found) | where
     if predictions:

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from thermospindle.diagnosis.ladder.ladder import ladder as climb
+from thermospindle.report.progress import going_on
 from thermospindle.report.text.ladder_table import growing, ladder_json, show_ladder
 from thermospindle.report.verbs.answer import Answer, answered, check_out, with_effects, write_json
 from thermospindle.sim.campaign.beside import doubtful
@@ -28,7 +29,7 @@ def ladder(
     check_out(out)
     (spindle, catalogue), tests = with_effects(scene, effect_files), read_campaign(campaign)
     chosen = None if effects is None else [by_name(name, catalogue) for name in effects]
-    with growing(Console(stderr=True, markup=False)) as live:
+    with going_on(asked, spindle, tests), growing(Console(stderr=True, markup=False)) as live:
         found = climb(spindle, tests, chosen, catalogue, live.step, live.progress)
 
     def pictures(folder: Path) -> None:
