@@ -16,9 +16,11 @@ import numpy as np
 
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange, listed
 from thermospindle.model.machine import Spindle
-from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.types import Array
 from thermospindle.sim.campaign.beside import beside, check_points
 from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
+from thermospindle.sim.campaign.compared import ACROSS, MOST_LINES, SILENT, Compared, compared, cosines
+from thermospindle.sim.campaign.misread import misread
 
 FACTORS = {
     1e3: "millimetres told as metres, or kilonewtons as newtons",
@@ -32,17 +34,9 @@ LARGE, ENDLESS, ALIKE = float(np.log(10**0.5)), float(np.log(1e7)), 0.25
 which part of it they have the same."""
 WITHIN, SCATTER = 0.15, 1.0
 """Relative, of a factor; and of ln ratio over the lines of an FRF, its median deviation up to which it is one."""
-SILENT = 1e-2
-"""Of the largest FRF of a test, in rms: smaller ones are forbidden by symmetry, and their size is noise; so are lines below as much of its median."""
-ACROSS = -0.5
-"""Mean cosine between measured and computed phases, below which an FRF is reversed: between -0.8 and -1 where it is, and above -0.25 where joints are twice as stiff as drawn."""
-LARGEST = 1e30
-"""Of any unit: a computed FRF as large as that is of a spindle that no bearing holds."""
 BETTER = 2.0
 AXES = {1 / (2 * np.pi): "rad/s told as Hz", 2 * np.pi: "Hz told as rad/s"}
 """Factors from the lines as told to those that they may be. Others take lines out of the band of the scene's hammer test."""
-MOST_LINES = 1000
-"""Of an FRF that are looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +67,10 @@ def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
         tests = _tests(spindle, campaign)
         if (axis := _axis(spindle, campaign, tests)) is not None:
             return [axis]
-        if (turned := _turned(spindle, campaign)) is not None:
-            return [turned]
+        every = (own for t in campaign.tests if t.frf is not None and (own := compared(spindle, campaign, t)) is not None)
+        for whole in (_turned(spindle, campaign), misread(spindle, campaign.quantity, list(every))):
+            if whole is not None:
+                return [whole]
     except (BadInput, NoEquilibrium, OutsideRange) as error:
         return [f"the FRFs are not set beside those of {spindle.name}: {error}"]
     names = {p.node: f"{p.node} ({p.name})" for p in campaign.points}
@@ -98,23 +94,17 @@ def _tests(spindle: Spindle, campaign: Campaign, scale: float = 1.0) -> dict[str
 
 
 def _pairs(spindle: Spindle, campaign: Campaign, test: Test, scale: float) -> list[Pair]:
-    """The FRFs of a test at some of its lines; none of a table of modes, or where nothing holds the model, or it has no answer."""
-    own = beside(spindle, campaign.points, test, condition_of(test))
-    if own is None or not own.held or not len(own.measured.frequency):
-        return []
-    step = -(-len(own.measured.frequency) // MOST_LINES)
-    measured = own.measured.value[..., ::step]
-    computed = own.computed(scale * own.measured.frequency[::step])
-    if not np.abs(computed).max() < LARGEST:
-        return []
-    size = np.sqrt(np.mean(np.abs(computed) ** 2, axis=-1))
-    x, a = (np.log(np.maximum(np.abs(value), 1e-300)) for value in (measured, computed))
+    """The FRFs of a test that can be compared, one by one."""
+    own = compared(spindle, campaign, test, scale)
+    return [] if own is None else _each(own)
+
+
+def _each(own: Compared) -> list[Pair]:
+    x, a = (np.log(np.maximum(np.abs(value), 1e-300)) for value in (own.measured, own.computed))
     silence = tuple(float(np.log(SILENT) + np.median(value, axis=-1).max()) for value in (x, a))
-    cosine = _cosine(measured, computed, computed)
-    turns = [np.cos(np.angle(v * v[..., :1].conj())).min(axis=-1) < ACROSS for v in (measured, computed)]
-    cosine = np.where(turns[0] & turns[1], cosine, 0.0)
-    ends = [(i, j, r, h) for i, r in enumerate(own.measured.response_nodes) for j, h in enumerate(own.measured.reference_nodes)]
-    return [Pair(r, h, x[i, j], a[i, j], float(cosine[i, j]), (silence[0], silence[1]), bool(size[i, j] > SILENT * size.max())) for i, j, r, h in ends]
+    cosine = np.where(own.turning, cosines(own.measured, own.computed, own.computed), 0.0)
+    ends = [(i, j, r, h) for i, r in enumerate(own.response_nodes) for j, h in enumerate(own.reference_nodes)]
+    return [Pair(r, h, x[i, j], a[i, j], float(cosine[i, j]), (silence[0], silence[1]), bool(own.loud[i, j])) for i, j, r, h in ends]
 
 
 # ---------------------------------------------------------------- lines in another unit
@@ -153,12 +143,12 @@ def _turned(spindle: Spindle, campaign: Campaign) -> str | None:
         step = -(-len(told.measured.frequency) // MOST_LINES)
         lines, measured = told.measured.frequency[::step], told.measured.value[..., ::step]
         own, turned = told.computed(lines), other.computed(lines)
-        size, differ = np.sqrt(np.mean(np.abs(own) ** 2, axis=-1)), _cosine(own, turned, own)
+        size, differ = np.sqrt(np.mean(np.abs(own) ** 2, axis=-1)), cosines(own, turned, own)
         loud = size > SILENT * size.max()
         depends, same = loud & (differ < ACROSS), loud & (differ > -ACROSS)
         if depends.sum() < 2 or not same.any():
             continue
-        told_so, if_turned = _cosine(measured, own, own), _cosine(measured, turned, own)
+        told_so, if_turned = cosines(measured, own, own), cosines(measured, turned, own)
         if not (np.all(told_so[depends] < ACROSS) and np.all(if_turned[depends] > -ACROSS) and np.median(told_so[same]) > 0):
             return None
         found.append(t.id)
@@ -168,12 +158,6 @@ def _turned(spindle: Spindle, campaign: Campaign) -> str | None:
         f"test{'s' * (len(found) > 1)} {listed(found)}: FRFs from one plane to the other are those that {spindle.name} has turning the other way: is the sense of rotation another than is told "
         "(speed_rpm is positive about +z), or does a direction point the other way, as -Y where +Y is?"
     )
-
-
-def _cosine(a: ComplexArray, b: ComplexArray, computed: ComplexArray) -> Array:
-    """Mean cosine (responses, references) between the phases of FRFs (responses, references, n) over the louder half of the computed lines."""
-    loud = np.abs(computed) >= np.median(np.abs(computed), axis=-1, keepdims=True)
-    return np.asarray(np.mean(np.cos(np.angle(a * b.conj())), axis=-1, where=loud), float)
 
 
 # ---------------------------------------------------------------- factors of units, and signs
