@@ -17,7 +17,7 @@ from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, Hypothesis
 from thermospindle.diagnosis.inference.search import Search, search
 from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for
-from thermospindle.diagnosis.parameters.mechanism import Mechanism, strongest, unmoved, variants
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, shared, strongest, unmoved, variants
 from thermospindle.diagnosis.prediction.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.prediction.next_test import NextTest, next_tests
 from thermospindle.model.machine import Condition, Spindle
@@ -158,12 +158,21 @@ def _own_laws(found: Search, verdict: Verdict) -> tuple[Drift, ...]:
     """Every effect that the verdict names and that is likelier with a law of the data's own, or departs from the one assumed, once: from the most probable
     explanation that has it."""
     drifts: dict[str, Drift] = {}
+    conditions = [d.condition for d in found.model.tests]
     for c in verdict.candidates:
         if set(c.names) <= set(verdict.effects):
-            for k, (m, departure) in enumerate(zip(c.hypothesis.mechanisms, c.hypothesis.evidence.learned.departures, strict=True)):
-                if m.own_law or departure >= DEPARTS:
+            for k, m in enumerate(c.hypothesis.mechanisms):
+                if m.own_law or departs(c.hypothesis, k, conditions):
                     drifts.setdefault(m.name, _drift(found, c.hypothesis, k))
     return tuple(drifts.values())
+
+
+def departs(h: Hypothesis, k: int, conditions: Sequence[Condition]) -> bool:
+    """Whether the data have mechanism `k` of an explanation otherwise than by its law: by much of its usual size, or by more than all that they have of it by its law, however little that is."""
+    m, departure = h.mechanisms[k], h.evidence.learned.departures[k]
+    change, law = h.evidence.sizes[k] - m.size.neutral, shared(m, conditions)
+    by_law = law * (law @ change) / max(float(law @ law), 1e-300)
+    return bool(departure >= DEPARTS or (departure > 0 and np.linalg.norm(change - by_law) > np.linalg.norm(by_law)))
 
 
 def _drift(found: Search, h: Hypothesis, k: int) -> Drift:

@@ -17,6 +17,7 @@ from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
+from thermospindle.model.types import Array
 from thermospindle.sim.campaign.beside import measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Noise
 from thermospindle.sim.effects import of_scene
@@ -59,18 +60,19 @@ def changes(spindle: Spindle, present: Applied, names: Sequence[str], conditions
     """By what the change of the balls' stiffness with temperature and speed may be off, from how speed changes the drawing's across the axis; nothing of a speed at which no spindle can be built."""
 
     @cache
-    def across(at: Condition) -> float:
-        return float(sum(b.stiffness[0, 0] for b in operating_point(spindle, at, present).state.bearings))
+    def across(at: Condition) -> Array:
+        return np.array([b.stiffness[0, 0] for b in operating_point(spindle, at, present).state.bearings])
 
-    def faster(c: Condition) -> float:
+    def faster(c: Condition) -> Array:
         try:
             return across(Condition(c.temperature, c.speed)) / across(Condition(c.temperature)) - 1.0
         except FAILED:
-            return 0.0
+            return np.zeros(len(spindle.bearings))
 
     if not spindle.bearings:
         return []
-    return changes_of(names, [(c.temperature - spindle.reference_temperature) / RANGE_K for c in conditions], [faster(c) for c in conditions])
+    of_rows = [b.name for b in spindle.bearings]
+    return changes_of(names, [(c.temperature - spindle.reference_temperature) / RANGE_K for c in conditions], of_rows, [faster(c) for c in conditions])
 
 
 def expected_noise(spindle: Spindle) -> Noise:

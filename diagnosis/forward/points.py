@@ -19,6 +19,7 @@ from thermospindle.sim.effects.effect import Effect, Values
 
 Applied = Sequence[tuple[Effect, Values]]
 
+NO_ROWS: Mapping[int, float] = {}
 Told = Sequence[tuple[Nuisance, float]]
 """Parameters with how much they are, in their own units."""
 
@@ -43,7 +44,7 @@ def _otherwise(told: Told) -> tuple[Effect, Values]:
     shares = {p.index: value for p, value in told if p.kind == kinds_of.BALLS}
     warmer = sum(value for p, value in told if p.kind == kinds_of.CHANGE and p.test is None)
     own = {p.index: value for p, value in told if p.kind == kinds_of.CHANGE and p.test is not None}
-    return otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0)))
+    return otherwise(shares, warmer, (own.pop(0, 0.0), own.pop(1, 0.0)), {i - 2: value for i, value in own.items()})
 
 
 def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:
@@ -71,9 +72,9 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
     return Effect("apart", "", "", (), "", (), "", pair=pair), {}
 
 
-def otherwise(shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float, float] = (0.0, 0.0)) -> tuple[Effect, Values]:
+def otherwise(shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float, float] = (0.0, 0.0), rows: Mapping[int, float] = NO_ROWS) -> tuple[Effect, Values]:
     """Stiffness and damping of ball rows off by these shares, in each of `DIRECTIONS` by number; in all directions by `warmer` at `RANGE_K` from the reference temperature, in
-    proportion to that; and by `own` across the axis, and along it and in tilt."""
+    proportion to that; by `own` across the axis, and along it and in tilt; and in all directions of `rows` by number."""
     d = np.sqrt(np.maximum(1 + np.array(own), 0.0))[[0, 0, 1, 1, 1]]
     for i, share in shares.items():
         d[list(DIRECTIONS[i][1])] *= np.sqrt(max(1 + share, 0.0))
@@ -81,7 +82,8 @@ def otherwise(shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float
 
     def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
         factor = square * max(1 + warmer * (condition.temperature - spindle.reference_temperature) / RANGE_K, 0.0)
-        return changed(state, bearings=tuple(changed(b, stiffness=factor * b.stiffness, damping=factor * b.damping) for b in state.bearings))
+        each = [factor * max(1 + rows.get(i, 0.0), 0.0) for i in range(len(state.bearings))]
+        return changed(state, bearings=tuple(changed(b, stiffness=k * b.stiffness, damping=k * b.damping) for b, k in zip(state.bearings, each, strict=True)))
 
     return Effect("otherwise", "", "", (), "", (), "", pair=pair), {}
 

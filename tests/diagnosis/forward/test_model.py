@@ -15,11 +15,13 @@ from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth
 from thermospindle.diagnosis.data.window import Alike, Window
 from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
 from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.forward.points import otherwise
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.ladder.left_out import LeftOut, unseen
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
+from thermospindle.sim.operating import operating_point
 
 
 @pytest.mark.parametrize(("quantity", "decay"), [("mobility", 0.0), ("accelerance", 15.0), ("receptance", 15.0)])
@@ -55,10 +57,22 @@ def test_derivatives_of_lines_whose_errors_go_together(scene):
 
 def test_what_a_bearing_may_change_by_otherwise():
     """With temperature in all tests alike, a third of that in each by itself, and there a share of what speed does; nothing where nothing changes."""
-    found = kinds_of.changes_of(["cold", "warm", "fast"], [0.0, 1.0, 0.5], [0.0, 0.0, -0.1])
-    assert [p.test for p in found] == [None, 1, 1, 2, 2]
-    assert [p.sd for p in found] == pytest.approx([1e-3, 3e-4, 3e-4, 1.5e-4 + 3e-3, 1.5e-4 + 3e-3])
-    assert kinds_of.changes_of(["cold"], [0.0], [0.0]) == []
+    rows, still = ["upper", "lower"], np.zeros(2)
+    found = kinds_of.changes_of(["cold", "warm", "fast"], [0.0, 1.0, 0.5], rows, [still, still, np.array([-0.15, -0.05])])
+    assert [p.test for p in found] == [None, 1, 1, 2, 2, 2, 2]
+    assert [p.sd for p in found] == pytest.approx([1e-3, 3e-4, 3e-4, 1.5e-4 + 3e-3, 1.5e-4 + 3e-3, 0.3 * 4.5e-3, 0.3 * 1.5e-3])
+    assert [p.name for p in found[5:]] == ["change of the balls' stiffness of upper in fast", "change of the balls' stiffness of lower in fast"]
+    assert kinds_of.changes_of(["cold"], [0.0], rows, [still]) == []
+
+
+def test_a_row_that_speed_changes_otherwise_is_alone_in_it(scene):
+    """Of two rows: the nuisance of one changes its stiffness and damping by that share, in all directions, and nothing of the other's."""
+    effect, values = otherwise({}, rows={1: 0.01})
+    state = operating_point(scene, Condition(20.0)).state
+    lower, upper = effect.pair(scene, Condition(20.0), values, state).bearings
+    assert lower.stiffness == pytest.approx(state.bearings[0].stiffness, rel=1e-12)
+    assert upper.stiffness == pytest.approx(1.01 * state.bearings[1].stiffness, rel=1e-12)
+    assert upper.damping == pytest.approx(1.01 * state.bearings[1].damping, rel=1e-12)
 
 
 @pytest.mark.parametrize("rows", [None, 0])
