@@ -29,6 +29,10 @@ CONTACT_ANGLE = (5.0, 60.0)
 """Degrees: deep-groove bearings have 8 to 15 of their clearance, angular contact ones 12 to 40, thrust ones 60."""
 TIGHTEST, LOOSEST = -1.2e-4, 1e-3
 """Of the pitch diameter, between which mounted clearances lie: N and NN rows of machine tools are set to between -5 and 5 um at 100 to 150 mm, and C3 of such a size is 90 um."""
+OFF_MIDDLE = 0.4
+"""Ball diameters by which the pitch diameter may differ from the middle of the raceways: those are drawn as shoulders, or to the groove's bottom."""
+SOFTEST = 1e3
+"""N/m: a tenth of a millimetre changes the force of a softer spring by 0.1 N at most."""
 SAG = 1.0 * MM
 """By which the weight of what turns would sink on one bearing alone: more than any gap between what turns and what stands, and seals and motors would rub."""
 GRAVITY = 9.81
@@ -156,6 +160,26 @@ def _preload(found: Looked) -> Iterator[str]:
                 yield f"{where} the preload is {what} that of the reference: {', '.join(moved)}"
 
 
+def _pitch(found: Looked) -> Iterator[str]:
+    """Balls whose circle is not between the raceways of the section."""
+    for b in found.spindle.bearings:
+        if b.name not in {own.name for own in found.spindle.ringed}:
+            continue
+        inner, outer = found.spindle.region(b.inner_ring).r[1], found.spindle.region(b.outer_ring).r[0]
+        if abs(b.pitch_diameter - inner - outer) > OFF_MIDDLE * b.ball_diameter:
+            yield (
+                f"bearing {b.name}: pitch_diameter_mm = {b.pitch_diameter / MM:g}, and its rings leave the balls a circle of {(inner + outer) / MM:.4g} mm, between {inner / MM:g} and {outer / MM:g} mm of "
+                "radius: is it the pitch diameter of another bearing?"
+            )
+
+
+def _springs(found: Looked) -> Iterator[str]:
+    """Springs that keep a force whatever is asked of them, in which a unit may be another."""
+    for s in found.spindle.sets:
+        if s.spring is not None and s.spring.rate is not None and s.spring.rate < SOFTEST:
+            yield f"set {s.name}: its spring has a rate of {s.spring.rate:g} N/m, which keeps its force whatever the rings do; preload springs have 1e4 to 1e8, and 2 N/um are 2e6 N/m"
+
+
 def _half_sprung(found: Looked) -> Iterator[str]:
     """Rows that are loaded the same way, of which the spring moves some."""
     for s in found.spindle.sets:
@@ -225,4 +249,4 @@ def _constant(b: LinearBearing) -> bool:
     return len(b.temperature) * len(b.speed) == 1
 
 
-OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _clearances, _massless, _same_place, _raceways, _contacts, _angles, _catalogues, _soft, _preload, _half_sprung, _pressed, _pushed, _sense, _tables)
+OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _clearances, _massless, _same_place, _raceways, _contacts, _angles, _catalogues, _soft, _preload, _pitch, _springs, _half_sprung, _pressed, _pushed, _sense, _tables)

@@ -74,18 +74,19 @@ def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
     except (BadInput, NoEquilibrium, OutsideRange) as error:
         return [f"the FRFs are not set beside those of {spindle.name}: {error}"]
     names = {p.node: f"{p.node} ({p.name})" for p in campaign.points}
-    if said := _mistaken([*tests.values()], names, spindle.name):
+    turning = {t.id for t in campaign.tests if t.speed}
+    if said := _mistaken([*tests.values()], names, spindle.name, bool(turning)):
         return said
     of_one: dict[str, list[str]] = {}
     for test, pairs in tests.items():
-        for sentence in _mistaken([pairs], names, spindle.name):
+        for sentence in _mistaken([pairs], names, spindle.name, test in turning):
             of_one.setdefault(sentence, []).append(test)
     return [f"test{'s' * (len(ids) > 1)} {listed(ids)}: {sentence}" for sentence, ids in of_one.items()]
 
 
-def _mistaken(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
+def _mistaken(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str, turns: bool) -> list[str]:
     """What some tests, all alike, tell of channels, units and signs; beside another channel's FRFs factors and signs say nothing."""
-    return _swapped(tests, names, scene) or [*_factors(tests, names, scene), *_reversed(tests, names, scene)]
+    return _swapped(tests, names, scene) or [*_factors(tests, names, scene), *_reversed(tests, names, scene, turns)]
 
 
 def _tests(spindle: Spindle, campaign: Campaign, scale: float = 1.0) -> dict[str, list[Pair]]:
@@ -196,9 +197,10 @@ def _scaled(tests: Sequence[Sequence[Pair]], scene: str) -> list[str]:
     return [f"all FRFs are about {_times(np.exp(middle))} those that {scene} has: is a unit or a sensitivity another than is told?"]
 
 
-def _reversed(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
+def _reversed(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str, turns: bool) -> list[str]:
     whose = _shared(tests, names, lambda p: -1.0 if p.cosine < ACROSS else None)
-    return [f"{who} have the other sign than those that {scene} has: does sensor or hammer look the other way than is told, as -X where +X is?" for who, _ in whose]
+    other = " Or, of FRFs from one plane to the other, does the spindle turn the other way (speed_rpm is positive about +z)?" if turns else ""
+    return [f"{who} have the other sign than those that {scene} has: does sensor or hammer look the other way than is told, as -X where +X is?{other}" for who, _ in whose]
 
 
 def _ratio(pair: Pair) -> float | None:

@@ -25,6 +25,8 @@ from thermospindle.sim.resonance.critical import criticals
 from thermospindle.sim.running.excitation import harmonics, response
 
 ODD = [
+    ("machine-tool", "pitch_diameter_mm = 90.0           #", "pitch_diameter_mm = 85.0           #", "pitch_diameter_mm = 85, and its rings leave the balls a circle of"),
+    ("machine-tool", "preload_rate_N_per_m = 1.0e6", "preload_rate_N_per_m = 2.0", "its spring has a rate of 2 N/m, which keeps its force whatever the rings do"),
     ("five_bearing", "tip_stiffness_N_per_m = 3.0e7", "tip_stiffness_N_per_m = 3.0e6", "the hammer gives no force above 2615 Hz"),
     ("five_bearing", "hammer_mass_g = 100.0", "hammer_mass_g = 10.0", "pulse of 57.4 us is shorter than a sample of 80 us"),
     ("five_bearing", "hammer_mass_g = 100.0", "hammer_mass_g = 370.0", "less than a tenth of its force"),

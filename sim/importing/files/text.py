@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ FORTRAN = re.compile(r"^([-+]?(?:\d+\.?\d*|\.\d+))[dD]([-+]?\d+)$")  # 1.5D-03, 
 NUMBER_LIKE = re.compile(r"[-+]?\d[\d.,' ]*([eE][-+]?\d+)?")
 THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?")
 LONGEST_HEADING = 200
+FEW = 3  # rows above a line that is none, which tell that it stands among them
 LARGEST_FILE = 400e6  # bytes
 
 
@@ -151,6 +154,11 @@ def _parse(cells: list[str], comma: bool) -> list[float | complex] | None:
         return None
 
 
+def _of_either(cells: list[str]) -> list[float | complex] | None:
+    """A row with decimal points, or commas."""
+    return _parse(cells, False) or _parse(cells, True)
+
+
 def _number(text: str, comma: bool) -> float | complex:
     if comma:
         if "." in text:
@@ -185,6 +193,7 @@ def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, co
                 raise BadInput(f"{file}: line {number}: {line.strip()[:60]!r} stands below the numbers; nothing may follow them")
             if row is None:
                 _refuse_gap(file, number, _cells(line, separator), len(rows[-1]), comma)
+                _refuse_among(file, lines[: index + 1], [_of_either(_cells(text, separator)) for _, text in lines[max(index - FEW, 0) : index]], rows[-1])
             break
         rows.append(row)
     else:
@@ -195,6 +204,14 @@ def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, co
             column = int(np.argmin(np.isfinite(row))) + 1
             raise BadInput(f"{file}: line {lines[index + 1 + at][0]}: column {column}: NaN or infinite; only finite numbers are allowed")
     return rows, index + 1
+
+
+def _refuse_among(file: Path, until: Sequence[tuple[int, str]], before: Sequence[list[float | complex] | None], after: list[float | complex]) -> None:
+    """`BadInput` where the last of some lines is no row, and the few rows `before` it go on in the one `after` it: as many numbers, the first of which rises."""
+    first = [abs(row[0]) for row in before if row is not None and len(row) == len(after)]
+    if len(first) == FEW and all(a < b for a, b in pairwise([*first, abs(after[0])])):
+        number, line = until[-1]
+        raise BadInput(f"{file}: line {number}: {line.strip()[:60]!r} stands among the numbers, and is no row of {len(after)} of them")
 
 
 def _refuse_gap(file: Path, number: int, cells: list[str], width: int, comma: bool) -> None:
