@@ -48,11 +48,14 @@ def going_on(question: bytes, told: Callable[[str], object]) -> Iterator[None]:
         try:
             with keeping(pages.page):
                 yield
-        except BaseException:
+        except KeyboardInterrupt:
             if pages.written:
                 told("what was computed is kept; the same command goes on from there")
+                work = None
             raise
-        shutil.rmtree(work, ignore_errors=True)
+        finally:
+            if work is not None:  # it is done, or ends alike when it is asked for again
+                shutil.rmtree(work, ignore_errors=True)
 
 
 class _Pages:

@@ -82,7 +82,22 @@ def test_what_takes_little_time_is_not_kept(cache: Path, monkeypatch: pytest.Mon
     with pytest.raises(Stopped):
         work(asked, stop=5, said=said)
     assert not said
-    assert not list(cache.glob("unfinished-*/*"))
+    assert not list(cache.glob("unfinished-*"))
+
+
+def test_work_that_ends_in_an_error_keeps_nothing(cache: Path) -> None:
+    """It would end in the same again."""
+    said = list[str]()
+
+    def fails() -> None:
+        with unfinished.going_on(b"squares", said.append):
+            in_parallel(lambda k: k * k, range(3), 1)
+            raise ValueError("no square")
+
+    with pytest.raises(ValueError, match="no square"):
+        fails()
+    assert not said
+    assert not list(cache.glob("unfinished-*"))
 
 
 def test_what_was_not_asked_for_longest_goes_first(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
