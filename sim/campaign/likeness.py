@@ -18,7 +18,7 @@ from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange, li
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.beside import beside, check_points
-from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
+from thermospindle.sim.campaign.campaign import Campaign, condition_of
 from thermospindle.sim.campaign.compared import ACROSS, MOST_LINES, SILENT, Compared, compared, cosines
 from thermospindle.sim.campaign.misread import misread
 
@@ -64,11 +64,11 @@ def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
         return []
     try:
         check_points(spindle, campaign)
-        tests = _tests(spindle, campaign)
+        every = _compared(spindle, campaign)
+        tests = {test: _pairs(own) for test, own in every.items()}
         if (axis := _axis(spindle, campaign, tests)) is not None:
             return [axis]
-        every = (own for t in campaign.tests if t.frf is not None and (own := compared(spindle, campaign, t)) is not None)
-        for whole in (_turned(spindle, campaign), misread(spindle, campaign.quantity, list(every))):
+        for whole in (_turned(spindle, campaign), misread(spindle, campaign.quantity, list(every.values()))):
             if whole is not None:
                 return [whole]
     except (BadInput, NoEquilibrium, OutsideRange) as error:
@@ -89,18 +89,13 @@ def _mistaken(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: 
     return _swapped(tests, names, scene) or [*_factors(tests, names, scene), *_reversed(tests, names, scene, turns)]
 
 
-def _tests(spindle: Spindle, campaign: Campaign, scale: float = 1.0) -> dict[str, list[Pair]]:
-    """The FRFs of every test that has some, its lines taken `scale` times as high as they are told."""
-    return {t.id: pairs for t in campaign.tests if (pairs := _pairs(spindle, campaign, t, scale))}
+def _compared(spindle: Spindle, campaign: Campaign, scale: float = 1.0) -> dict[str, Compared]:
+    """The FRFs of every test that can be compared, its lines taken `scale` times as high as they are told."""
+    return {t.id: own for t in campaign.tests if (own := compared(spindle, campaign, t, scale)) is not None}
 
 
-def _pairs(spindle: Spindle, campaign: Campaign, test: Test, scale: float) -> list[Pair]:
-    """The FRFs of a test that can be compared, one by one."""
-    own = compared(spindle, campaign, test, scale)
-    return [] if own is None else _each(own)
-
-
-def _each(own: Compared) -> list[Pair]:
+def _pairs(own: Compared) -> list[Pair]:
+    """The FRFs of a test one by one."""
     x, a = (np.log(np.maximum(np.abs(value), 1e-300)) for value in (own.measured, own.computed))
     silence = tuple(float(np.log(SILENT) + np.median(value, axis=-1).max()) for value in (x, a))
     cosine = np.where(own.turning, cosines(own.measured, own.computed, own.computed), 0.0)
@@ -117,7 +112,7 @@ def _axis(spindle: Spindle, campaign: Campaign, tests: Mapping[str, Sequence[Pai
     if not SCATTER < told < float("inf"):
         return None
     for scale, mistake in AXES.items():
-        if BETTER * _misfit([p for pairs in _tests(spindle, campaign, scale).values() for p in pairs if p.loud]) < told:
+        if BETTER * _misfit([p for own in _compared(spindle, campaign, scale).values() for p in _pairs(own) if p.loud]) < told:
             lines = next(t.frf.frequency for t in campaign.tests if t.frf is not None)
             return f"all FRFs fit those that {spindle.name} has far better with lines from {scale * lines[0]:.4g} to {scale * lines[-1]:.4g} Hz: is the unit of their axis another than is told, as {mistake}?"
     return None

@@ -21,8 +21,7 @@ EXCHANGED = "exchanged"
 
 def misread(spindle: Spindle, quantity: str, tests: Sequence[Compared]) -> str | None:
     """What is said of all FRFs of a campaign of one `quantity`; None where nothing is, or fewer than two pass a resonance."""
-    told = _phases(tests, quantity, quantity)
-    if len(told) < 2:
+    if not tests or len(told := _phases(tests, quantity, quantity)) < 2:
         return None
     scatter = {other: _scatter(tests, quantity, other) for other in (*POWER, EXCHANGED)}
     fits = [
