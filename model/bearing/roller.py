@@ -16,6 +16,7 @@ rollers widen the outer race and narrow the inner one: c = c(T) + g sum(Q), g th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -72,9 +73,15 @@ class RollerState(LinearState):
 
     clearance: float  # m, diametral
     load: float
-    contact_force: float  # N, of the most loaded roller
     row: RollerRow
     displacement: tuple[float, ...] = (0.0,) * 5  # m, rad: of the outer ring against the inner one
+
+    @cached_property
+    def contact_force(self) -> float:
+        """N, of the most loaded roller, which stands where the rings push; worked out for who asks, for no mode or FRF does."""
+        u = np.array(self.displacement)
+        force = respond(self.row, u).force
+        return float(with_cage_at(self.row, u, float(np.arctan2(-force[1], -force[0])))[2].max())
 
 
 def line_constant(length: float, modulus: float = STEEL) -> float:
@@ -169,9 +176,8 @@ def roller_state(spindle: Spindle, b: RollerBearing, motion: RingMotion | None, 
 
 
 def state_at(spindle: Spindle, b: RollerBearing, row: RollerRow, displacement: Array | None = None) -> RollerState:
-    """What a bearing with these rollers is, centred or at a displacement (5,) of its outer ring against its inner one; its most loaded roller stands where the rings push."""
+    """What a bearing with these rollers is, centred or at a displacement (5,) of its outer ring against its inner one."""
     u = np.zeros(5) if displacement is None else displacement
     answer = respond(row, u)
     damping = 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * answer.tangent
-    most = with_cage_at(row, u, float(np.arctan2(-answer.force[1], -answer.force[0])))[2].max()
-    return RollerState(b.name, b.z, answer.tangent, damping, row.clearance, answer.load, float(most), row, tuple(float(x) for x in u))
+    return RollerState(b.name, b.z, answer.tangent, damping, row.clearance, answer.load, row, tuple(float(x) for x in u))
