@@ -8,7 +8,7 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.latest import Latest
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
-from thermospindle.diagnosis.parameters.nuisance import DIRECTIONS, RANGE_K, Nuisance, Unevenness
+from thermospindle.diagnosis.parameters.nuisance import CHANGES, DIRECTIONS, RANGE_K, Nuisance, Unevenness
 from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.changed import changed
@@ -44,7 +44,8 @@ def _otherwise(told: Told) -> tuple[Effect, Values]:
     shares = {p.index: value for p, value in told if p.kind == kinds_of.BALLS}
     warmer = sum(value for p, value in told if p.kind == kinds_of.CHANGE and p.test is None)
     own = {p.index: value for p, value in told if p.kind == kinds_of.CHANGE and p.test is not None}
-    return otherwise(shares, warmer, (own.pop(0, 0.0), own.pop(1, 0.0)), {i - 2: value for i, value in own.items()})
+    rows = {i - len(CHANGES): value for i, value in own.items() if i >= len(CHANGES)}
+    return otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0)), rows)
 
 
 def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:

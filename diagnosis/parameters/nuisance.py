@@ -54,6 +54,8 @@ BALLS_SD = 0.01  # in one direction beside that across the axis
 DIRECTIONS = (("axial", (2,)), ("tilt", (3, 4)))
 CHANGE, CHANGE_SD = "change of the balls' stiffness", 0.03
 """Relative, at the reference width, of what the balls' inertia does to their stiffness at speed: where centrifugal force and gyroscopic moment are put, beside how large they are."""
+CHANGES = ("across the axis", "along it and in tilt")
+"""How all rows may be off alike, by number; each row by itself follows, by its number and theirs."""
 CHANGE_APART = 0.3
 """Of it, of each row by itself: rows of other sizes and loads are not off by the same. Balls that orbit each at its own speed, where here those of a row go with its cage, take 0.8 % of the radial stiffness of
 the front rows of an electrospindle at 20,000 rpm."""
@@ -166,12 +168,11 @@ class Resonance:
 def changes_of(tests: Sequence[str], far: Sequence[float], rows: Sequence[str], faster: Sequence[Array]) -> list[Nuisance]:
     """By what the change of the balls' stiffness may be off in tests so `far` (`RANGE_K`) from the reference temperature, where speed makes that of each of the `rows` `faster` (rows,) (relative) another."""
     found = [Nuisance(CHANGE, f"{CHANGE} with temperature", CONTACT_SD)] if any(far) else []
-    ways = ((0, "across the axis"), (1, "along it and in tilt"))
     for t, (name, f, n) in enumerate(zip(tests, far, faster, strict=True)):
         if sd := CONTACT_APART * CONTACT_SD * abs(f) + CHANGE_SD * abs(float(np.mean(n))):
-            found += [Nuisance(CHANGE, f"{CHANGE} {way} in {name}", sd, t, i) for i, way in ways]
+            found += [Nuisance(CHANGE, f"{CHANGE} {way} in {name}", sd, t, i) for i, way in enumerate(CHANGES)]
         if len(rows) > 1 and np.any(n):
-            found += [Nuisance(CHANGE, f"{CHANGE} of {row} in {name}", CHANGE_APART * CHANGE_SD * abs(float(k)), t, len(ways) + i) for i, (row, k) in enumerate(zip(rows, n, strict=True))]
+            found += [Nuisance(CHANGE, f"{CHANGE} of {row} in {name}", CHANGE_APART * CHANGE_SD * abs(float(k)), t, len(CHANGES) + i) for i, (row, k) in enumerate(zip(rows, n, strict=True))]
     return found
 
 

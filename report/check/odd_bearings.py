@@ -163,8 +163,6 @@ def _preload(found: Looked) -> Iterator[str]:
 def _pitch(found: Looked) -> Iterator[str]:
     """Balls whose circle is not between the raceways of the section."""
     for b in found.spindle.bearings:
-        if b.name not in {own.name for own in found.spindle.ringed}:
-            continue
         inner, outer = found.spindle.region(b.inner_ring).r[1], found.spindle.region(b.outer_ring).r[0]
         if abs(b.pitch_diameter - inner - outer) > OFF_MIDDLE * b.ball_diameter:
             yield (

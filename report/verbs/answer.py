@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -17,9 +17,6 @@ from thermospindle.model.rotor.elements import BALLS, LINEAR
 from thermospindle.report.folder import check_folder, mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.known import equipped
-
-if TYPE_CHECKING:
-    pass
 
 STEPS = 5  # of temperature over a scene's range, unless a verb is given others
 
