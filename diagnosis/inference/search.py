@@ -38,7 +38,7 @@ from thermospindle.model.types import Array
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
 UNLIKELY = 5.0  # ln evidence behind the best, of a way to act that need not be told
-GAINED = {2: ENOUGH, 3: PLENTY}  # ln evidence of a second, and of a third, of which other ways are asked: an effect that is not needed has no way
+GAINED = {1: LITTLE, 2: ENOUGH, 3: PLENTY}  # ln evidence of one effect, of a second and of a third, of which other ways are asked: an effect that is not needed has no way
 RIVALS = 3  # explanations of which other ways are asked, at most: each shares its prior among all that its effects have
 WAYS = 8  # in which an effect of these may act too, at most, those that screening promises most of
 
@@ -102,7 +102,7 @@ def search(
     none = _without_what_does_nothing(model, none, ended)
     anew = dict(zip(map(id, finalists), ended, strict=True))
     ranked = [anew.get(id(h), h) for h in found]
-    ranked += _other_ways(model, ranked, every, tried, workers)
+    ranked += _other_ways(model, [none, *ranked], every, tried, workers)
     progress("the best fitted anew")
     laws = {m.name: m for m in reversed(named)}
     ranked = [h for h in ranked if not _against_its_law(model, none.fit.nuisance, h, laws)]
@@ -157,10 +157,11 @@ def _from_the_drawing(model: CampaignModel, h: Hypothesis) -> Hypothesis:
 
 def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Sequence[Mechanism], tried: Singles, workers: int | None) -> list[Hypothesis]:
     """The best explanation of the catalogue, and those that do nearly as well, with each of their effects acting in every other way that it has (the other bearing, the other ideal case of its
-    law; by each law of its own where it has the data's): screening chose one, and what the data do not tell of that is not to be told as if they did. Not where one effect less does as well."""
+    law; by each law of its own where it has the data's): screening chose one, and what the data do not tell of that is not to be told as if they did. Not where one effect less, or none, does as well."""
     named = of_each_name([h for h in ranked if h.mechanisms and not h.free])
     best = max((h.evidence.ln for h in ranked), default=-np.inf)
-    needed = [h for h in named if not any(set(o.names) < set(h.names) and o.evidence.ln > h.evidence.ln - GAINED[len(h.mechanisms)] for o in named)]
+    less = [*named, *(h for h in ranked if not h.mechanisms)]
+    needed = [h for h in named if not any(set(o.names) < set(h.names) and o.evidence.ln > h.evidence.ln - GAINED[len(h.mechanisms)] for o in less)]
     rivals = [h for h in needed[:RIVALS] if h.evidence.ln > max(needed[0].evidence.ln - UNLIKELY, best - NEAR)]
     return [way for h in rivals for way in _ways_of(model, h, every, tried, workers)]
 

@@ -188,7 +188,7 @@ def test_a_way_that_promised_next_to_nothing_is_not_followed(spindle):
 
 
 def test_ways_are_asked_of_what_is_needed(spindle, monkeypatch):
-    """Of a preload that was lost, with or without a gain beside it that does nothing: not those of an explanation that an effect less does as well as, nor, where it is needed, of an effect of no size.
+    """Of a preload that was lost, with or without a gain beside it that does nothing: not those of an explanation that an effect less, or nothing, does as well as, nor, where it is needed, of an effect of no size.
     A third of a diagnosis went into these."""
     preload, gain = (variants(effect(name)) for name in ("preload_loss", "sensor_gain"))
     model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, [(preload[0].effect, preload[0].effect.typical())]))
@@ -211,6 +211,13 @@ def test_ways_are_asked_of_what_is_needed(spindle, monkeypatch):
         late = replace(both, evidence=replace(both.evidence, ln=alone.evidence.ln + gained))
         _other_ways(model, [alone, late], [*preload, *gain], tried, 1)
         assert asked == [("preload_loss",)] * (len(preload) - 1)
+    nothing = fit(model)
+    none = Hypothesis(nothing, evidence(model, nothing))
+    for gained, ways in ((1.0, 0), (20.0, len(preload) - 1)):
+        asked.clear()
+        more = replace(alone, evidence=replace(alone.evidence, ln=none.evidence.ln + gained))
+        _other_ways(model, [none, more], [*preload, *gain], tried, 1)
+        assert len(asked) == ways
 
 
 def test_a_law_of_the_datas_own_is_asked_for_each_law_that_its_effect_has(spindle):
