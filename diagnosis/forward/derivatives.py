@@ -68,7 +68,7 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     lights = model.lights(t, linear.matrices.dofs, x)
     channels, hammers, ways = (_alike(model, *which[t]) for which in (model.numbers.gains, model.numbers.hammers, model.numbers.misses))
     glued = _alike(model, *model.numbers.sensors)
-    shared += [channels, hammers, ways, glued, _each(np.array(record, int)), *(_alike(model, n, n) for _, n in lights)]
+    shared += [_each(model.numbers.law[0]), channels, hammers, ways, glued, _each(np.array(record, int)), *(_alike(model, n, n) for _, n in lights)]
     numbers, of, times = _after_each_other(shared)
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd
@@ -82,6 +82,8 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     for columns, power, paired, _ in discrepancies:
         for moved in response.moved_together(response.over(columns), power, paired):
             at = fill(at, moved)
+    for loss in model.losses(t, linear.matrices.dofs, x):
+        at = fill(at, response.by_loss(loss)[None])
     for c in np.unique(model.numbers.gains[t][1]):
         at = fill(at, np.where((model.numbers.channel_of[t][:n_resp] == c)[:, None, None], response.value, 0.0)[None])
     for h in np.unique(model.numbers.hammers[t][1]):

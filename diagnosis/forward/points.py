@@ -10,7 +10,8 @@ from thermospindle.diagnosis.forward.latest import Latest
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.nuisance import CHANGES, DIRECTIONS, RANGE_K, Nuisance, Unevenness
 from thermospindle.diagnosis.parameters.numbers import Numbers
-from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.bearing.ball_row import by_own_orbits
+from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
 from thermospindle.model.changed import changed
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
@@ -45,7 +46,8 @@ def _otherwise(told: Told) -> tuple[Effect, Values]:
     warmer = sum(value for p, value in told if p.kind == kinds_of.CHANGE and p.test is None)
     own = {p.index: value for p, value in told if p.kind == kinds_of.CHANGE and p.test is not None}
     rows = {i - len(CHANGES): value for i, value in own.items() if i >= len(CHANGES)}
-    return otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0)), rows)
+    orbits = sum(value for p, value in told if p.kind == kinds_of.ORBITS)
+    return otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0)), rows, orbits)
 
 
 def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:
@@ -73,9 +75,11 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
     return Effect("apart", "", "", (), "", (), "", pair=pair), {}
 
 
-def otherwise(shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float, float] = (0.0, 0.0), rows: Mapping[int, float] = NO_ROWS) -> tuple[Effect, Values]:
+def otherwise(
+    shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float, float] = (0.0, 0.0), rows: Mapping[int, float] = NO_ROWS, orbits: float = 0.0
+) -> tuple[Effect, Values]:
     """Stiffness and damping of ball rows off by these shares, in each of `DIRECTIONS` by number; in all directions by `warmer` at `RANGE_K` from the reference temperature, in
-    proportion to that; by `own` across the axis, and along it and in tilt; and in all directions of `rows` by number."""
+    proportion to that; by `own` across the axis, and along it and in tilt; in all directions of `rows` by number; and by a share of what balls would be that had each its own of the `orbits`."""
     d = np.sqrt(np.maximum(1 + np.array(own), 0.0))[[0, 0, 1, 1, 1]]
     for i, share in shares.items():
         d[list(DIRECTIONS[i][1])] *= np.sqrt(max(1 + share, 0.0))
@@ -84,9 +88,20 @@ def otherwise(shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float
     def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
         factor = square * max(1 + warmer * (condition.temperature - spindle.reference_temperature) / RANGE_K, 0.0)
         each = [factor * max(1 + rows.get(i, 0.0), 0.0) for i in range(len(state.bearings))]
-        return changed(state, bearings=tuple(changed(b, stiffness=k * b.stiffness, damping=k * b.damping) for b, k in zip(state.bearings, each, strict=True)))
+        bearings = _by_orbits(spindle, state.bearings, orbits)
+        return changed(state, bearings=tuple(changed(b, stiffness=k * b.stiffness, damping=k * b.damping) for b, k in zip(bearings, each, strict=True)))
 
     return Effect("otherwise", "", "", (), "", (), "", pair=pair), {}
+
+
+def _by_orbits(spindle: Spindle, bearings: Sequence[BearingState], share: float) -> Sequence[BearingState]:
+    if not share:
+        return bearings
+    found = []
+    for b, drawing in zip(bearings, spindle.bearings, strict=True):
+        change = share * by_own_orbits(b.row, np.array(b.displacement) if b.displacement else None)
+        found.append(changed(b, stiffness=b.stiffness + change, damping=b.damping + damping_time(spindle, drawing) * change))
+    return found
 
 
 def uneven(shares: Sequence[tuple[Unevenness, float]]) -> tuple[Effect, Values]:

@@ -43,6 +43,15 @@ class Light:
         return np.asarray(s**2 * np.concatenate([[spring / whole], moved]), complex)
 
 
+@dataclass(frozen=True, eq=False)
+class Loss:
+    """What dampers lose, of which a `share` is lost alike at all frequencies: then the dynamic stiffness has that of i `constant` - s `damping` (n, n) more (`model.rotor.chain.out_of_phase`)."""
+
+    share: float
+    constant: Array
+    damping: Array
+
+
 class Response:
     """FRFs of one test's linear model at its lines, in the measured quantity.
 
@@ -50,7 +59,7 @@ class Response:
     its reduced model (`model.rotor.reduced`), which is off by 1e-5 of the largest response at most, with its mass where it is and not at nodes.
     """
 
-    def __init__(self, linear: Linear, data: LineData, gain: Array, cut: float = 0.0, lights: Sequence[Light] = ()) -> None:
+    def __init__(self, linear: Linear, data: LineData, gain: Array, cut: float = 0.0, lights: Sequence[Light] = (), losses: Sequence[Loss] = ()) -> None:
         chain, m = linear.chain, linear.matrices
         n_resp = data.value.shape[0]
         omega = 2 * np.pi * data.frequency
@@ -58,7 +67,7 @@ class Response:
         self.s: ComplexArray = np.asarray(1j * omega + (chain.decay + window), complex)
         rows, references = chain.response_rows[:n_resp], chain.reference_rows
         self._basis: Array | None = None
-        self._lights = lights
+        self._lights, self._losses = lights, losses
         self._matrices, between = (m.mass, m.damping, m.stiffness), linear.between
         if len(m.mass) > LARGE and len(omega):
             small = reduced(m, np.concatenate([rows, references]), float(omega.max()))
@@ -92,6 +101,9 @@ class Response:
         for light in self._lights:
             b = self.over(light.columns) @ light.shares
             terms.append((light.felt(s)[0], np.outer(b, b)))
+        for loss in self._losses:
+            if loss.share:
+                terms += [(np.full_like(s, 1j * loss.share), self._onto(loss.constant)), (-loss.share * s, self._onto(loss.damping))]
         by_line, matrices = (np.array(of, complex) for of in zip(*terms, strict=True))
         return np.tensordot(by_line, matrices, (0, 0))
 
@@ -160,6 +172,11 @@ class Response:
         whole = own_left[:, None] * own_right[None]
         by_frequency, by_damping = felt[1:, None, None] * whole
         return np.concatenate([shares, [by_frequency, by_damping, light.far * by_frequency, light.far**2 * by_frequency]])
+
+    def by_loss(self, loss: Loss) -> ComplexArray:
+        """Derivative (n_resp, n_ref, L) by the share of a loss that is the same at all frequencies."""
+        constant, damping = self._onto(loss.constant), self._onto(loss.damping)
+        return self._answering(1j * _over(constant.T, self._forced(0)) - _over(damping.T, self._forced(1)))
 
     def by_products_of_shares(self, columns: Array, rows: Integers, others: Integers) -> ComplexArray:
         """Derivatives (k, n_resp, n_ref, L) by products of two shares each of light resonances on `columns` (n, m), for one that is felt as a mass of -1 / s^2."""

@@ -79,14 +79,20 @@ class Numbers:
 
     @cached_property
     def balls(self) -> list[Integers]:
-        """For every test the numbers of the parameters by which balls are stiffer: in one direction, with temperature, and in this test."""
-        own = self._of(kinds_of.BALLS, kinds_of.CHANGE)
+        """For every test the numbers of the parameters by which balls are stiffer: in one direction, with temperature, by their orbits, and in this test."""
+        own = self._of(kinds_of.BALLS, kinds_of.CHANGE, kinds_of.ORBITS)
         return [own[np.isin(self.places[0][own], (-1, t))] for t in range(len(self.tests))]
 
     @cached_property
     def flung(self) -> Integers:
         """The number of the parameter by which the balls' inertia loads are off, where the scene has these."""
         return self._of(kinds_of.FLUNG)
+
+    @cached_property
+    def law(self) -> tuple[Integers, Integers]:
+        """The numbers of the parameters of the law of damping, and which of its two kinds each is of."""
+        own = self._of(kinds_of.LAW)
+        return own, self.places[1][own]
 
     @cached_property
     def uneven(self) -> Integers:

@@ -196,6 +196,20 @@ def with_cage_held(row: BallRow) -> BallRow:
     return replace(row, inertia=replace(row.inertia, cage=at_one_speed(row, [line], None)[0]))
 
 
+def by_own_orbits(row: BallRow, displacement: Array | None = None) -> Array:
+    """What of the tangent stiffness (5, 5) at a displacement (5,) of the outer ring were another if every ball orbited as fast as it rolls by itself, and no cage held
+    them together (Jones 1960; Harris 1991, ch. 9, have each ball so); its symmetric part. Nothing where balls have no inertia, or a cage whose speed is held."""
+    if row.inertia is None or not row.heavy or row.inertia.cage is not None:
+        return np.zeros((5, 5))
+    line = centre_line(row, np.zeros(5) if displacement is None else displacement)
+    lines = [(r, z) for r, z in line.tolist()]
+    allowed = tolerances(row, max(hypot(r, z) for r, z in lines))
+    alone = {at: np.reshape(settled(row.ball, at, *allowed).stiffness(), (2, 2)) for at in dict.fromkeys(lines)}
+    b = kinematics(row)
+    tangent = b.reshape(-1, 5).T @ (np.array([alone[at] for at in lines]) @ b).reshape(-1, 5) - respond(row, displacement).tangent
+    return np.asarray((tangent + tangent.T) / 2)
+
+
 def at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -> tuple[float, dict[Vector, tuple[Balance, Driven]]]:
     """Speed of the cage, and what a ball is at every different one of `lines` (balls, 2) between the groove centres; balls on the same line, as of centred rings, are one."""
     free, weights = row.ball, Counter(lines)

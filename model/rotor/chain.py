@@ -223,6 +223,17 @@ def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
     return damping_of_loss(mass, stiffness, [(e.lossy, element_rows(chain, e)) for e in chain.elements if e.loss_factor])
 
 
+def out_of_phase(chain: RotorBase, at: Matrices, omega: float) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """What the loss factors of a chain's elements, and their dampers, lose were it the same at all frequencies: each as the imaginary part H (n, n) of a complex stiffness K + i H (Bishop, *J. R.
+    Aeronaut. Soc.* 59 (1955) 738), with the damping (n, n) that its matrices `at` have of it. Dampers lose as much at `omega` (rad/s)."""
+    dampers = _felt(chain, len(chain.dofs))[0] if chain.elements else np.zeros_like(at.damping)
+    lossy = np.zeros_like(at.damping)
+    for e in chain.elements:
+        if e.loss_factor:
+            lossy += element_rows(chain, e).T @ e.lossy @ element_rows(chain, e)
+    return (lossy, (at.damping + at.damping.T) / 2 - dampers), (omega * dampers, dampers)
+
+
 @lru_cache(maxsize=64)
 def _places(layout: Layout, elements: tuple[tuple[str, str, float, str], ...]) -> tuple[Array, Integers]:
     """Rows (elements, 5, w) of the relative motion that each element (a, b, z, slides) resists, over the w degrees of freedom of its ends, and the place

@@ -38,7 +38,7 @@ def damping_of_loss(mass: Array, stiffness: Array, lossy: Sequence[tuple[Array, 
     k, size = (stiffness + stiffness.T) / 2, np.sqrt(np.abs(np.diag(stiffness)))
     coupled = scipy.sparse.csr_array((np.abs(k) > 1e-12 * np.outer(size, size)).astype(float))
     count, label = scipy.sparse.csgraph.connected_components(coupled, directed=False)
-    felt = np.concatenate([_root(own) @ rows for own, rows in lossy])
+    felt = (_roots(np.array([own for own, _ in lossy])) @ np.array([rows for _, rows in lossy])).reshape(-1, len(mass))
     for block in range(count):
         own = np.flatnonzero(label == block)
         root = np.sqrt(mass[own])
@@ -52,7 +52,7 @@ def damping_of_loss(mass: Array, stiffness: Array, lossy: Sequence[tuple[Array, 
     return whole
 
 
-def _root(matrix: Array) -> Array:
-    """A matrix R with R^T R = a symmetric matrix, or the nearest one without negative stiffness."""
-    value, vector = np.linalg.eigh((matrix + matrix.T) / 2)
-    return np.asarray(np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T)
+def _roots(matrices: Array) -> Array:
+    """Matrices R (k, 5, 5) with R^T R = each of some symmetric ones, or the nearest ones without negative stiffness."""
+    value, vector = np.linalg.eigh((matrices + matrices.transpose(0, 2, 1)) / 2)
+    return np.asarray(np.sqrt(np.maximum(value, 0.0))[:, :, None] * vector.transpose(0, 2, 1))

@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from thermospindle.model.bearing.ball_row import BallInertia, BallRow, displacement_under, energy, respond
+from thermospindle.model.bearing.ball_row import (
+    BallInertia,
+    BallRow,
+    by_own_orbits,
+    centre_line,
+    displacement_under,
+    energy,
+    kinematics,
+    respond,
+    with_cage_held,
+)
+from thermospindle.model.bearing.heavy_ball.balance import settled
 from thermospindle.model.bearing.hertz import race_contact
 from thermospindle.model.errors import NoEquilibrium
 
@@ -184,6 +195,27 @@ def test_radial_stiffness_at_speed_is_that_of_harris_equations_with_one_cage():
     assert respond(bearing, centred).tangent[0, 0] == pytest.approx(slope[0], rel=1e-5)
     own = -(on_inner(bearing, centred + aside)[0] - on_inner(bearing, centred - aside)[0]) / 2e-7
     assert own[0] == pytest.approx(172.1e6, rel=1e-3)
+
+
+@pytest.mark.parametrize("aside", [0.0, 500.0])
+def test_stiffness_with_each_ball_on_its_own_orbit(aside):
+    """Against differences of what balls that know of no cage press on the outer ring: 156 N/um of the one above where rings are centred. Nothing of balls without inertia, or of a cage that is held."""
+    bearing = fast_218()
+    moved = displacement_under(bearing, np.array([aside, 0, 17800.0, 0, 0]))
+
+    def on_outer(u):
+        forces = [settled(bearing.ball, (r, z), 1e-9, 1.0).on_outer for r, z in centre_line(bearing, u).tolist()]
+        return np.ravel(forces) @ kinematics(bearing).reshape(-1, 5)
+
+    steps = np.diag([1e-9, 1e-9, 1e-9, 1e-8, 1e-8])
+    slope = np.array([(on_outer(moved + h) - on_outer(moved - h)) / (2 * h.sum()) for h in steps]).T
+    tangent = respond(bearing, moved).tangent
+    own = (tangent + tangent.T) / 2 + by_own_orbits(bearing, moved)
+    assert own == pytest.approx((slope + slope.T) / 2, rel=1e-5, abs=1e-6 * np.abs(slope).max())
+    if not aside:
+        assert own[0, 0] == pytest.approx(156e6, rel=3e-3)
+    for still in (replace(bearing, inertia=None), replace(bearing, inertia=replace(FAST, share=0.0)), with_cage_held(bearing)):
+        assert not by_own_orbits(still, moved).any()
 
 
 def test_both_rings_feel_the_same_across_the_axis():
