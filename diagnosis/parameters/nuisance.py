@@ -82,7 +82,7 @@ DAMPING_SD = 0.03  # relative error of a damping ratio at the reference width
 STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at the reference width
 ACTION, OF_CONDITIONS = "action of effects", "action of temperature and speed"
 """No kinds of nuisances, but sizes that are learned: by what share effects, and temperature and speed by themselves, do to a mode other than the model says."""
-UNWRITTEN = (BALLS, *APART, UNEVEN, MASSES, EXPANSION, COEFFICIENT, FLUNG, ORBITS, CHANGE, LAW, STIFFNESS_DRIFT, DAMPING_DRIFT)
+UNWRITTEN = (BALLS, *APART, UNEVEN, MASSES, EXPANSION, COEFFICIENT, FLUNG, ORBITS, CHANGE, STIFFNESS_DRIFT, DAMPING_DRIFT)
 """How a spindle may differ from its drawing without a place in the table `build` of a scene."""
 DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
 SHARE_SD = 0.03  # root of the mass that a mode carries along in a light resonance, over its own modal mass
