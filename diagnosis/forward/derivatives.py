@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.linear import Linear, Pairs, Rates, pairs, products, same_chain, together
+from thermospindle.diagnosis.forward.linear import Linear, Pairs, Rates, between_of, pairs, same_chain, together
 from thermospindle.diagnosis.forward.measuring import aside, askew, hammer_gain
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.points import Applied
@@ -82,8 +82,8 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     for columns, power, paired, _ in discrepancies:
         for moved in response.moved_together(response.over(columns), power, paired):
             at = fill(at, moved)
-    for loss in model.losses(t, linear.matrices.dofs, x):
-        at = fill(at, response.by_loss(loss)[None])
+    for kind in model.numbers.law[1]:
+        at = fill(at, response.by_law(int(kind))[None])
     for c in np.unique(model.numbers.gains[t][1]):
         at = fill(at, np.where((model.numbers.channel_of[t][:n_resp] == c)[:, None, None], response.value, 0.0)[None])
     for h in np.unique(model.numbers.hammers[t][1]):
@@ -151,7 +151,7 @@ def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Appli
     """
     (at, answer), moved = model.standing(t, x, first), model.linear(t, x, second)
     if at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain):
-        by = products(*((getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness")))
+        by = between_of(at, moved, apart)
         return answer.moved(by)[0] if isinstance(answer, Table) else model.whitened(t, answer.moved(by)[0], 0.0)
     return (model.in_errors(t, model.answer(t, x, moved)) - model.in_errors(t, answer)) / apart
 

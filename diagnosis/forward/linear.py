@@ -24,18 +24,20 @@ Pairs = Sequence[tuple[Integers, Integers]]
 """Numbers (k,) of a first and of a second vector of k parameters, once or more."""
 
 CHAIN = ("response_rows", "reference_rows", "gain", "delay", "decay")
+BY_LAW = 3  # and on: what stands in place of a power of s, of what another law of damping has otherwise
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
     """One test's linear model: matrices with dofs, and its measuring chain; `between` is what the mass between nodes of shafts adds to M, the N beside it, and what
-    it adds to C + G (`model.rotor.distributed`), None without shafts."""
+    it adds to C + G (`model.rotor.distributed`), None without shafts; `lost` (3, n, n), of a test of lines, what another law of damping has otherwise (`model.rotor.chain.losses`)."""
 
     matrices: Matrices
     chain: Measurement
     layout: tuple
     between: Between | None = None
+    lost: Array | None = None
 
     def moved(self, first: Linear, second: Linear, times: float) -> Linear:
         """With `times` the difference of two others added, in all that may differ; the same where these have other degrees of freedom."""
@@ -47,7 +49,8 @@ class Linear:
 
         matrices = on(self.matrices, first.matrices, second.matrices, ("mass", "damping", "stiffness"))
         chain = self.chain if same_chain(first.chain, second.chain) else on(self.chain, first.chain, second.chain, CHAIN)
-        return replace(self, matrices=matrices, chain=chain)
+        lost = None if self.lost is None or first.lost is None or second.lost is None else self.lost + times * (second.lost - first.lost)
+        return replace(self, matrices=matrices, chain=chain, lost=lost)
 
 
 def shown(chain: Measurement, pole: ComplexArray, right: ComplexArray) -> ComplexArray:
@@ -83,7 +86,8 @@ def mass_changes(spindle: Spindle, terms: Sequence[MassTerm], dofs: Dofs) -> tup
 @dataclass(frozen=True, eq=False)
 class Products:
     """Changes of M, C and K by `count` parameters as sums of few products of two vectors, for an element moves few degrees of freedom: the change of
-    the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first."""
+    the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first; a power from `BY_LAW` on stands for
+    what a law of damping has in its place (`Response.law`)."""
 
     count: int
     of: Integers
@@ -93,12 +97,12 @@ class Products:
     right: Array
 
 
-def products(mass: Array, damping: Array, stiffness: Array) -> Products:
-    """The products of one parameter's dM, dC, dK (n, n), to `EXACT` of the largest of each."""
+def products(mass: Array, damping: Array, stiffness: Array, lost: Array | None = None) -> Products:
+    """The products of one parameter's dM, dC, dK (n, n), and of the change of what is `lost` (3, n, n), to `EXACT` of the largest of each."""
     n = len(mass)
     power: list[int] = []
     left, right = [np.zeros((n, 0))], [np.zeros((n, 0))]
-    for exponent, change in ((2, mass), (1, damping), (0, stiffness)):
+    for exponent, change in ((2, mass), (1, damping), (0, stiffness), *enumerate(() if lost is None else lost, BY_LAW)):
         rows, columns = np.flatnonzero(change.any(axis=1)), np.flatnonzero(change.any(axis=0))
         if len(rows):
             u, size, v = np.linalg.svd(change[np.ix_(rows, columns)], full_matrices=False)
@@ -146,6 +150,12 @@ class Rates:
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
         return {"numbers": self.numbers, "each": self.each, "dofs": self.dofs}
+
+
+def between_of(at: Linear, moved: Linear, apart: float) -> Products:
+    """The products of what differs between the matrices of two linear models so far `apart`."""
+    mass, damping, stiffness = ((getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness"))
+    return products(mass, damping, stiffness, None if at.lost is None or moved.lost is None else (moved.lost - at.lost) / apart)
 
 
 def same_chain(a: Measurement, b: Measurement) -> bool:

@@ -6,7 +6,6 @@ The receptance between hammers B and points A is A D(s)^-1 B^T with D = s^2 M + 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,7 +17,7 @@ from thermospindle.diagnosis.forward.latest import Latest
 from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_between, mass_changes
 from thermospindle.diagnosis.forward.measuring import channel_gain, measured, replace_measuring
 from thermospindle.diagnosis.forward.points import Applied, undrawn
-from thermospindle.diagnosis.forward.response import Light, Loss, Response
+from thermospindle.diagnosis.forward.response import Law, Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.masses import mass_terms
@@ -29,7 +28,8 @@ from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.rotor.chain import Matrices, matrices, out_of_phase
+from thermospindle.model.rotor.chain import Matrices, losses, matrices
+from thermospindle.model.rotor.modes import Between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, with_material
@@ -62,7 +62,7 @@ class CampaignModel:
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
-        return {k: v for k, v in self.__dict__.items() if not isinstance(v, Latest) and k not in ("_heavier", "_lost", "kept", "thinned")}
+        return {k: v for k, v in self.__dict__.items() if not isinstance(v, Latest) and k not in ("_heavier", "kept", "thinned")}
 
     @cached_property
     def thinned(self) -> CampaignModel:
@@ -177,16 +177,30 @@ class CampaignModel:
         return found
 
     def _linear(self, t: int, x: Array, effects: Applied) -> Linear:
+        bare = self.bare(t, x, effects)
+        m, point = bare.matrices, self.operating(t, x, effects)
+        stiffness, damping = self._discrepancy(t, m, x)
+        mass, gyroscopic = self._otherwise_heavy(x, m.dofs)
+        whole = Matrices(m.mass + mass, m.damping + damping + point.chain.speed * gyroscopic, m.stiffness + stiffness, m.dofs)
+        return replace(bare, matrices=whole, chain=measured(self.numbers, t, point, x), between=self._between(point))
+
+    def _between(self, point: OperatingPoint) -> Between | None:
+        if self.lumped:
+            return None
+        if "_between" not in point.__dict__:
+            object.__setattr__(point, "_between", mass_between(point, self.spindle))
+        return point.__dict__["_between"]
+
+    def bare(self, t: int, x: Array, effects: Applied) -> Linear:
+        """The linear model of test `t` at its operating point as its chain has it: without discrepancies, mass between nodes, and what its measuring chain may be off by."""
         point = self.operating(t, x, effects)
-        worked_out = point.__dict__.get("_bare")
-        if worked_out is None:
-            worked_out = matrices(point.chain), None if self.lumped else mass_between(point, self.spindle)
-            object.__setattr__(point, "_bare", worked_out)
-        bare, between = worked_out
-        stiffness, damping = self._discrepancy(t, bare, x)
-        mass, gyroscopic = self._otherwise_heavy(x, bare.dofs)
-        whole = Matrices(bare.mass + mass, bare.damping + damping + point.chain.speed * gyroscopic, bare.stiffness + stiffness, bare.dofs)
-        return Linear(whole, measured(self.numbers, t, point, x), point.chain.layout, between)
+        found = point.__dict__.get("_bare")
+        if found is None:
+            own = matrices(point.chain)
+            lost = losses(point.chain, own) if isinstance(self.tests[t], LineData) else None
+            found = Linear(own, point.measurement, point.chain.layout, lost=lost)
+            object.__setattr__(point, "_bare", found)
+        return found
 
     def _otherwise_heavy(self, x: Array, dofs: Dofs) -> tuple[Array, Array]:
         """What bodies that have their mass otherwise than drawn add to M and, per rad/s, to G (n, n)."""
@@ -240,32 +254,15 @@ class CampaignModel:
     def _response(self, t: int, x: Array, linear: Linear, data: LineData) -> Response:
         cut = 0.0 if self.numbers.record is None else float(x[self.numbers.record])
         lights = [light for light, _ in self.lights(t, linear.matrices.dofs, x)]
-        return Response(linear, data, channel_gain(self.numbers, t, x), cut, lights, self.losses(t, linear.matrices.dofs, x))
+        return Response(linear, data, channel_gain(self.numbers, t, x), cut, lights, self.law(x))
 
-    def losses(self, t: int, dofs: Dofs, x: Array) -> list[Loss]:
-        """What test `t` loses by each of the parameters of the law of damping, over `dofs`, at nuisance values."""
+    def law(self, x: Array) -> Law:
+        """The law of damping at nuisance values."""
         numbers, which = self.numbers.law
-        own = self._out_of_phase(t, dofs) if len(numbers) else ()
-        return [Loss(float(x[n]) * self.parameters[n].sd, *own[i]) for n, i in zip(numbers.tolist(), which.tolist(), strict=True)]
-
-    def _out_of_phase(self, t: int, dofs: Dofs) -> Sequence[tuple[Array, Array]]:
-        """Of loss factors, and of dampers, of the spindle as drawn at the condition of test `t`, over `dofs`; nothing of those that an effect brings, nor of a condition at which it cannot be built."""
-        if (t, dofs) not in self._lost:
-            nothing = np.zeros((len(dofs), len(dofs)))
-            self._lost[t, dofs] = [(nothing, nothing)] * len(kinds_of.LAWS)
-            with suppress(*FAILED):
-                chain = self.operating(t, np.zeros(len(self.parameters)), []).chain
-                place = {dof: i for i, dof in enumerate(chain.dofs)}
-                row, own = np.array([(i, place[dof]) for i, dof in enumerate(dofs) if dof in place], int).reshape(-1, 2).T
-                onto = np.zeros((len(dofs), len(place)))
-                onto[row, own] = 1.0
-                drawn = out_of_phase(chain, matrices(chain), 2 * np.pi * self.spindle.structure.damping_frequency)
-                self._lost[t, dofs] = [(onto @ constant @ onto.T, onto @ damping @ onto.T) for constant, damping in drawn]
-        return self._lost[t, dofs]
-
-    @cached_property
-    def _lost(self) -> dict[tuple[int, Dofs], list[tuple[Array, Array]]]:
-        return {}
+        shares = np.zeros(len(kinds_of.LAWS))
+        shares[which] = x[numbers] * self.numbers.sd[numbers]
+        factors, dampers = shares.tolist()
+        return Law(factors, dampers, 2 * np.pi * self.spindle.structure.damping_frequency)
 
     def lights(self, t: int, dofs: Sequence[tuple[str, str]], x: Array) -> list[tuple[Light, Integers]]:
         """The light resonances of test `t` at nuisance values, over `dofs`, and the numbers of the parameters of each."""

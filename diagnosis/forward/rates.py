@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.linear import Rates, products
+from thermospindle.diagnosis.forward.linear import Rates, between_of, products
 from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
-from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.types import Array
 
 STEP = 0.02  # of a prior standard deviation, for differences
@@ -18,8 +17,8 @@ def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old:
     """dM, dC, dK by build tolerances, expansion of materials and rings, bearings apart, stiffness and inertia of balls, uneven joints, temperature and how bodies have their mass, for every test; what structure alone moves is kept from `old`."""
     numbers, each, dofs, uneven = [], [], [], frozenset(model.numbers.uneven)
     for t, effects in enumerate(effects_of):
-        base = model.operating(t, x, effects)
-        at = matrices(base.chain)
+        base, speed = model.bare(t, x, effects), model.operating(t, x, effects).chain.speed
+        at = base.matrices
         own = [*range(len(model.build)), *model.numbers.expansion, *model.numbers.coefficients, *model.numbers.apart, *model.numbers.balls[t], *model.numbers.flung, *model.numbers.uneven, model.numbers.temperature[t]]
         kept = old.each[t] if old is not None and old.dofs[t] == at.dofs else ()
         found = []
@@ -30,17 +29,17 @@ def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old:
             step = x.copy()
             step[i] += STEP
             try:
-                moved = matrices(model.operating(t, step, effects).chain)
+                moved = model.bare(t, step, effects)
                 apart = STEP
             except FAILED:  # the end of a law or of contact: from the other side
                 step[i] -= 2 * STEP
-                moved = matrices(model.operating(t, step, effects).chain)
+                moved = model.bare(t, step, effects)
                 apart = -STEP
-            if moved.dofs != at.dofs:
-                moved = at
-            found.append(products(*((getattr(moved, w) - getattr(at, w)) / apart for w in ("mass", "damping", "stiffness"))))
+            if moved.matrices.dofs != at.dofs:
+                moved = base
+            found.append(between_of(base, moved, apart))
         masses = zip(*model.heavier(at.dofs), strict=True)
-        found += kept[len(own) :] or [products(mass, base.chain.speed * gyroscopic, np.zeros_like(mass)) for mass, gyroscopic in masses]
+        found += kept[len(own) :] or [products(mass, speed * gyroscopic, np.zeros_like(mass)) for mass, gyroscopic in masses]
         numbers.append(np.array([*own, *model.numbers.masses]))
         each.append(tuple(found))
         dofs.append(at.dofs)

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.linear import Linear, Pairs, Products
+from thermospindle.diagnosis.forward.linear import BY_LAW, Linear, Pairs, Products
 from thermospindle.diagnosis.forward.record import RecordEnd
 from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.rotor.modes import LARGE, Poles, poles
@@ -43,13 +43,17 @@ class Light:
         return np.asarray(s**2 * np.concatenate([[spring / whole], moved]), complex)
 
 
-@dataclass(frozen=True, eq=False)
-class Loss:
-    """What dampers lose, of which a `share` is lost alike at all frequencies: then the dynamic stiffness has that of i `constant` - s `damping` (n, n) more (`model.rotor.chain.out_of_phase`)."""
+@dataclass(frozen=True)
+class Law:
+    """How far what loss factors lose, and what `dampers` do, is the same at all frequencies, in which case dampers lose as much as they do at `omega` (rad/s)."""
 
-    share: float
-    constant: Array
-    damping: Array
+    factors: float = 0.0
+    dampers: float = 0.0
+    omega: float = 0.0
+
+    def over(self, s: ComplexArray) -> ComplexArray:
+        """What it adds to the dynamic stiffness (3, L) of each of `Linear.lost`: of i H for s C."""
+        return np.array([np.full_like(s, 1j * self.factors), -self.factors * s, self.dampers * (1j * self.omega - s)])
 
 
 class Response:
@@ -59,7 +63,7 @@ class Response:
     its reduced model (`model.rotor.reduced`), which is off by 1e-5 of the largest response at most, with its mass where it is and not at nodes.
     """
 
-    def __init__(self, linear: Linear, data: LineData, gain: Array, cut: float = 0.0, lights: Sequence[Light] = (), losses: Sequence[Loss] = ()) -> None:
+    def __init__(self, linear: Linear, data: LineData, gain: Array, cut: float = 0.0, lights: Sequence[Light] = (), law: Law = Law()) -> None:
         chain, m = linear.chain, linear.matrices
         n_resp = data.value.shape[0]
         omega = 2 * np.pi * data.frequency
@@ -67,7 +71,8 @@ class Response:
         self.s: ComplexArray = np.asarray(1j * omega + (chain.decay + window), complex)
         rows, references = chain.response_rows[:n_resp], chain.reference_rows
         self._basis: Array | None = None
-        self._lights, self._losses = lights, losses
+        self._lights, self._law = lights, law
+        self._lost: Array = np.zeros((0, *m.mass.shape)) if linear.lost is None else linear.lost
         self._matrices, between = (m.mass, m.damping, m.stiffness), linear.between
         if len(m.mass) > LARGE and len(omega):
             small = reduced(m, np.concatenate([rows, references]), float(omega.max()))
@@ -101,9 +106,7 @@ class Response:
         for light in self._lights:
             b = self.over(light.columns) @ light.shares
             terms.append((light.felt(s)[0], np.outer(b, b)))
-        for loss in self._losses:
-            if loss.share:
-                terms += [(np.full_like(s, 1j * loss.share), self._onto(loss.constant)), (-loss.share * s, self._onto(loss.damping))]
+        terms += [(by_law, self._onto(lost)) for by_law, lost in zip(self._law.over(s), self._lost, strict=False) if by_law.any()]
         by_line, matrices = (np.array(of, complex) for of in zip(*terms, strict=True))
         return np.tensordot(by_line, matrices, (0, 0))
 
@@ -173,10 +176,10 @@ class Response:
         by_frequency, by_damping = felt[1:, None, None] * whole
         return np.concatenate([shares, [by_frequency, by_damping, light.far * by_frequency, light.far**2 * by_frequency]])
 
-    def by_loss(self, loss: Loss) -> ComplexArray:
-        """Derivative (n_resp, n_ref, L) by the share of a loss that is the same at all frequencies."""
-        constant, damping = self._onto(loss.constant), self._onto(loss.damping)
-        return self._answering(1j * _over(constant.T, self._forced(0)) - _over(damping.T, self._forced(1)))
+    def by_law(self, kind: int) -> ComplexArray:
+        """Derivative (n_resp, n_ref, L) by how far what loss factors lose (0), or dampers (1), is the same at all frequencies."""
+        law = replace(self._law, factors=float(kind == 0), dampers=float(kind == 1))
+        return self._answering(sum(-by_law * _over(self._onto(lost).T, self._driven) for by_law, lost in zip(law.over(self.s), self._lost, strict=True) if by_law.any()))
 
     def by_products_of_shares(self, columns: Array, rows: Integers, others: Integers) -> ComplexArray:
         """Derivatives (k, n_resp, n_ref, L) by products of two shares each of light resonances on `columns` (n, m), for one that is felt as a mass of -1 / s^2."""
@@ -206,7 +209,8 @@ class Response:
                 else:  # so many products that their sum, acting on all degrees of freedom, is less work
                     found[k] = self._answering(self._felt(left[:, rows], right[:, rows], by.power[rows]))
             if (end := self._late) is not None:
-                found[by.of] += self._cut * end.moved(np.add.reduceat(end.kicked(left, right, by.power), by.first, axis=0))
+                ended = np.where(by.power < BY_LAW, left, 0.0), right, np.where(by.power < BY_LAW, by.power, 0)  # records end as dampers have it
+                found[by.of] += self._cut * end.moved(np.add.reduceat(end.kicked(*ended), by.first, axis=0))
         return found
 
     def _answering(self, force: ComplexArray) -> ComplexArray:
@@ -268,8 +272,8 @@ class Response:
     def _forced(self, power: int) -> ComplexArray:
         """The same (r, n_ref, L) of each degree of freedom by itself."""
         if power not in self._by_power:
-            forced = -(self.s**power) * self._driven
-            if (end := self._late) is not None:
+            forced = -(self.s**power if power < BY_LAW else self._law.over(self.s)[power - BY_LAW]) * self._driven
+            if (end := self._late) is not None and power < BY_LAW:
                 forced += self._cut * end.tail(np.eye(len(forced)), np.full(len(forced), power))
             self._by_power[power] = forced
         return self._by_power[power]

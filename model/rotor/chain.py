@@ -223,15 +223,16 @@ def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
     return damping_of_loss(mass, stiffness, [(e.lossy, element_rows(chain, e)) for e in chain.elements if e.loss_factor])
 
 
-def out_of_phase(chain: RotorBase, at: Matrices, omega: float) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """What the loss factors of a chain's elements, and their dampers, lose were it the same at all frequencies: each as the imaginary part H (n, n) of a complex stiffness K + i H (Bishop, *J. R.
-    Aeronaut. Soc.* 59 (1955) 738), with the damping (n, n) that its matrices `at` have of it. Dampers lose as much at `omega` (rad/s)."""
-    dampers = _felt(chain, len(chain.dofs))[0] if chain.elements else np.zeros_like(at.damping)
-    lossy = np.zeros_like(at.damping)
+def losses(chain: RotorBase, at: Matrices) -> Array:
+    """What loses energy in a chain (3, n, n): the imaginary part of the complex stiffness K + i H that loss factors are (Bishop, *J. R. Aeronaut. Soc.* 59 (1955) 738), the damping that its
+    matrices `at` have for it, and that of its dampers."""
+    n = len(chain.dofs)
+    dampers = _felt(chain, n)[0] if chain.elements else np.zeros((n, n))
+    constant = np.zeros((n, n))
     for e in chain.elements:
         if e.loss_factor:
-            lossy += element_rows(chain, e).T @ e.lossy @ element_rows(chain, e)
-    return (lossy, (at.damping + at.damping.T) / 2 - dampers), (omega * dampers, dampers)
+            constant += element_rows(chain, e).T @ e.lossy @ element_rows(chain, e)
+    return np.array([constant, (at.damping + at.damping.T) / 2 - dampers, dampers])
 
 
 @lru_cache(maxsize=64)

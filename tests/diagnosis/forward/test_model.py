@@ -37,6 +37,16 @@ def test_derivatives_of_lines(scene, quantity, decay):
         assert worst[kind] < 5e-3, kind
 
 
+def test_derivatives_of_lines_beside_loss_factors(scene):
+    """Of what is lost alike at all frequencies, tolerances of damping and stiffness change as much."""
+    joints = tuple(replace(j, damping_ratio=0.0, loss_factor=0.04) for j in scene.structure.joints)
+    model, x = made(replace(scene, structure=replace(scene.structure, joints=joints)))
+    assert np.abs(x[model.numbers.law[0]]).min() > 0.2
+    worst = worst_by_kind(model, 1, x)
+    assert worst[kinds_of.LAW] < 1e-4
+    assert worst[kinds_of.BUILD] < 5e-3
+
+
 @pytest.mark.parametrize("lossy", [False, True], ids=["dampers", "loss-factors"])
 def test_a_loss_that_is_the_same_at_all_frequencies_is_a_complex_stiffness(scene, lossy):
     """Every line of K + i H - w^2 M + i w G against it, with dampers beside loss factors as they are: what a program in the frequency domain has."""
