@@ -25,6 +25,12 @@ SAME = 3.0  # errors of their difference, within which sizes are the same
 MOVING = "a light resonance"  # whose frequency changes with temperature
 LEFT = "what is left"  # that changes, and tells of something else
 OFF, NAMED = 2.0, 4  # stated standard deviations from which a tolerance is said to be off, and how many of these are named
+LITTLE_OF_THE_WAY = 0.1  # of which nothing is said
+CONVENTIONS = {
+    (kinds_of.LAW, 0): "what loss factors lose is the same at all frequencies, as of a complex stiffness, where the model has dampers",
+    (kinds_of.LAW, 1): "what dampers lose is nearly the same at all frequencies",
+    (kinds_of.ORBITS, 0): "balls orbit each as fast as it rolls, where the model has them go with their cage",
+}
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 
 
@@ -169,6 +175,14 @@ def of_motions(model: CampaignModel, best: Hypothesis) -> str:
     rows = [(i, q) for i, q in enumerate(model.parameters) if q.kind == kinds_of.EXPANSION]
     off = [f"{q.name} {100 * q.at(best.evidence.mean[i]):+.2g} +- {100 * q.sd * errors[i]:.1g} %" for i, q in rows if abs(best.evidence.mean[i]) > max(OFF, errors[i])]
     return f" Thermal motions differ from what temperature and the scene's coefficients of expansion give: {', '.join(off)}." if off else ""
+
+
+def of_conventions(model: CampaignModel, best: Hypothesis) -> str:
+    """What honest programs do otherwise than this one, and the data do as far as can be told."""
+    errors = np.sqrt(np.maximum(np.diag(best.evidence.covariance), 0.0))
+    rows = [(float(best.evidence.mean[i]) * q.sd, float(errors[i]) * q.sd, CONVENTIONS[q.kind, max(q.index, 0)]) for i, q in enumerate(model.parameters) if q.kind in (kinds_of.LAW, kinds_of.ORBITS)]
+    told = [f"{what} ({value:.2f} +- {sd:.1g} of the way from one to the other)" for value, sd, what in rows if value > max(SAME * sd, LITTLE_OF_THE_WAY)]
+    return f" Taken into account: {'; '.join(told)}." if told else ""
 
 
 def of_what_is_left(best: Hypothesis, same: Overlap) -> str:

@@ -75,6 +75,7 @@ def decide(found: Search) -> Verdict:
     why += reason.of_resonances(found.model, best) + reason.of_what_is_left(best, same)
     told = best if word == "unexplained" else accepted
     why += reason.of_tolerances(found.model, told, word != "unexplained") + reason.of_motions(found.model, told)
+    why += reason.of_conventions(found.model, told)
     unknown = sum(c.probability for c in rest)
     return Verdict(word, effects, why, whole, rest, none, unknown, losses, before, after, density - plain, accepted, told)
 

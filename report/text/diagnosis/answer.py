@@ -80,6 +80,11 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         },
         "tolerances_beside": list(v.told.names),
         "learned": _learned(v.told.evidence),
+        "conventions": {
+            p.name: {"value": float(m) * p.sd, "sd": float(s) * p.sd}
+            for p, m, s in zip(d.search.model.parameters, v.told.evidence.mean, _sd(v.told.evidence), strict=False)
+            if p.kind in (kinds_of.LAW, kinds_of.ORBITS)
+        },
         "light_resonances": [{"frequency_Hz": r.frequency, "damping_ratio": r.damping} for r in shown(d.search.model, d.search.hypotheses[0])],
         "noise": {data.test.id: getattr(data, "noise_from", "the table of modes") for data in d.search.model.tests},
     }

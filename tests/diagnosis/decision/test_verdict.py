@@ -13,7 +13,16 @@ from thermospindle.diagnosis.decision import reason, verdict
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.loss import FALSE_ALARM, MISSED, WRONG
 from thermospindle.diagnosis.decision.verdict import decide
-from thermospindle.diagnosis.parameters.nuisance import BUILD, DAMPING_DRIFT, EXPANSION, EXPANSION_SD, STIFFNESS_DRIFT, Nuisance
+from thermospindle.diagnosis.parameters.nuisance import (
+    BUILD,
+    DAMPING_DRIFT,
+    EXPANSION,
+    EXPANSION_SD,
+    LAW,
+    ORBITS,
+    STIFFNESS_DRIFT,
+    Nuisance,
+)
 from thermospindle.model.machine import Condition
 
 CASES = {
@@ -229,6 +238,22 @@ def test_thermal_motions_that_are_off_are_said():
     assert told(1.0, (6.0, 0.0, 0.0)) == told(3.0, (1.0, 2.9, 0.0)) == ""
     assert told(3.0, (6.0, -4.0, 1.0)) == (
         " Thermal motions differ from what temperature and the scene's coefficients of expansion give: radial motion of the rings +1.8 +- 0.03 %, axial motion of the rings -1.2 +- 0.9 %."
+    )
+
+
+def test_what_other_programs_do_otherwise_is_said():
+    """Where the data have it, by more than three of its errors."""
+    lead = made({"a": 60.0}).hypotheses[0]
+    parameters = (Nuisance(LAW, "law of the damping of loss factors", 1.0, index=0), Nuisance(LAW, "law of the damping of dampers", 1.0, index=1), Nuisance(ORBITS, ORBITS, 1.0))
+
+    def told(mean: tuple[float, ...]) -> str:
+        evidence = replace(lead.evidence, mean=np.array(mean), covariance=np.diag([4e-4, 0.01, 0.04]))
+        return reason.of_conventions(SimpleNamespace(parameters=parameters), replace(lead, evidence=evidence))
+
+    assert told((0.05, -1.0, 0.5)) == ""
+    assert told((0.98, 0.2, 1.1)) == (
+        " Taken into account: what loss factors lose is the same at all frequencies, as of a complex stiffness, where the model has dampers (0.98 +- 0.02 of the way from one to the other); "
+        "balls orbit each as fast as it rolls, where the model has them go with their cage (1.10 +- 0.2 of the way from one to the other)."
     )
 
 
