@@ -108,14 +108,8 @@ def uneven(shares: Sequence[tuple[Unevenness, float]]) -> tuple[Effect, Values]:
     """Joints stiffer by a share one way and less stiff by as much across, to first order: K -> S K S, damping with it."""
     by_joint: dict[str, Array] = {}
     for u, share in shares:
-        first, second = u.moves
-        turn = by_joint.setdefault(u.joint, np.eye(5))
-        if u.turned:
-            turn[first, second] += share / 2
-            turn[second, first] += share / 2
-        else:
-            turn[first, first] += share / 2
-            turn[second, second] -= share / 2
+        for joint, pattern in u.patterns:
+            by_joint[joint] = by_joint.get(joint, np.eye(5)) + share / 2 * pattern
 
     def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
         turned = ((e, by_joint.get(e.name)) for e in chain.elements)

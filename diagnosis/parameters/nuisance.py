@@ -29,6 +29,7 @@ from thermospindle.diagnosis.parameters.masses import mass_terms
 from thermospindle.diagnosis.parameters.reference import ReferenceModes
 from thermospindle.model.built.tolerance import LEAST, MOST, Toleranced
 from thermospindle.model.machine import Spindle
+from thermospindle.model.shaft import Shaft
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array
 
@@ -115,30 +116,45 @@ class Nuisance:
         return float(np.clip(float(x) * self.sd, LEAST, MOST)) if self.kind == BUILD else float(x) * self.sd
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Unevenness:
-    """How a joint that is drawn alike all around may be built: against two `moves`, of which it is stiffer against the first, or against their sum with `turned`."""
+    """How what is drawn alike may be built: joints whose stiffness is K + (P K + K P) / 2 times its share, to first order, with a `pattern` P (5, 5) each; `sd` is that of the share."""
 
-    joint: str
-    moves: tuple[int, int]
-    turned: bool
-
-    @property
-    def name(self) -> str:
-        first, second = (MOVES[m].replace("_", " ") for m in self.moves)
-        return f"{self.joint} stiffer against {first} + {second} than {first} - {second}" if self.turned else f"{self.joint} stiffer against {first} than {second}"
+    name: str
+    sd: float
+    patterns: tuple[tuple[str, Array], ...]
 
 
 def unevennesses(spindle: Spindle) -> tuple[Unevenness, ...]:
-    """Of every joint whose stiffness is drawn alike against both moves across the axis, or both tilts: no joint is built so."""
+    """Of every joint whose stiffness is drawn alike against both moves across the axis, or both tilts: no joint is built so. It is stiffer against one of the two, or against their sum. And of shafts
+    that bend, section by section, whose steps and fits stiffen them otherwise than their diameters say."""
     beams = {name for s in spindle.structure.shafts for name in s.elements}
-    return tuple(
-        Unevenness(joint.name, moves, turned)
-        for joint in spindle.structure.joints
-        for moves in ((0, 1), (3, 4))
-        if joint.name not in beams and joint.stiffness[moves[0]] == joint.stiffness[moves[1]] > 0
-        for turned in (False, True)
-    )
+    found = []
+    for joint in spindle.structure.joints:
+        for first, second in ((0, 1), (3, 4)):
+            if joint.name not in beams and joint.stiffness[first] == joint.stiffness[second] > 0:
+                one, other = (MOVES[m].replace("_", " ") for m in (first, second))
+                plain, turned = np.zeros((2, 5, 5))
+                plain[first, first], plain[second, second] = 1.0, -1.0
+                turned[first, second] = turned[second, first] = 1.0
+                sd = spindle.tolerances.structure / np.sqrt(2)  # of two that are off by as much each
+                found += [
+                    Unevenness(f"{joint.name} stiffer against {one} than {other}", sd, ((joint.name, plain),)),
+                    Unevenness(f"{joint.name} stiffer against {one} + {other} than {one} - {other}", sd, ((joint.name, turned),)),
+                ]
+    return (*found, *(u for s in spindle.structure.shafts for u in _sections(s, spindle)))
+
+
+def _sections(shaft: Shaft, spindle: Spindle) -> list[Unevenness]:
+    """Of each segment of a shaft of several."""
+    centre = {name: (a + b) / 2 for name, a, b in zip(shaft.elements, shaft.nodes, shaft.nodes[1:], strict=False)}
+    found = []
+    for n, segment in enumerate(shaft.segments, 1):
+        low, high = segment.z
+        own = tuple((name, np.eye(5)) for name, z in centre.items() if low <= z < high)
+        if own and len(own) < len(centre):
+            found.append(Unevenness(f"segment {n} of {shaft.name} stiffer", spindle.tolerances.structure, own))
+    return found
 
 
 @dataclass(frozen=True)
@@ -201,7 +217,7 @@ def nuisances(
     found += changes
     if spindle.bearings and spindle.ball_inertia:
         found += [Nuisance(FLUNG, FLUNG, FLUNG_SD), Nuisance(ORBITS, ORBITS, ORBITS_SD)]
-    found += [Nuisance(UNEVEN, u.name, t.structure / np.sqrt(2), index=i) for i, u in enumerate(unevennesses(spindle))]  # of two that are off by as much each
+    found += [Nuisance(UNEVEN, u.name, u.sd, index=i) for i, u in enumerate(unevennesses(spindle))]
     found += [Nuisance(MASSES, m.name, m.sd) for m in mass_terms(spindle)]
     found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
     for i in range(len(modes.omega) if with_lines else modes.seen):

@@ -49,7 +49,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     )
     share = scale * values["joint_share"]
     factor = {
-        j.name: softening(spindle.materials[j.material], condition.temperature, spindle.reference_temperature, share)
+        j.name: softening(spindle.materials[j.material], condition.temperature, spindle.reference_temperature, scale if j.role == "beam" else share)
         for j in spindle.structure.joints
         if j.material
     }
@@ -107,7 +107,7 @@ EFFECT = Effect(
     title="Elastic moduli fall with temperature",
     equation=(
         "E(T) = E (1 - scale 22 eps(T)), eps the material's own thermal strain: d ln E / dT = -22 alpha, aluminium -5.1e-4/K, steel "
-        "-2.5e-4/K (Anderson, Phys. Rev. 144, 1966: on -d ln K / d ln V); joint stiffness ~ E of the joint's own material (joint_share of its fall; none where the scene names none), Hertz "
+        "-2.5e-4/K (Anderson, Phys. Rev. 144, 1966: on -d ln K / d ln V); shafts ~ E of theirs, joint stiffness ~ E of the joint's own material (joint_share of its fall; none where the scene names none), Hertz "
         "K ~ 2 / ((1 - nu_b^2)/E_b + (1 - nu_r^2)/E_r); ring motions by thermo-elastic influence of the softened section"
     ),
     parameters=(
@@ -128,7 +128,7 @@ EFFECT = Effect(
             typical=1.0,
             prior_sd=0.3,
             limits=(0.0, 2.0),
-            meaning="softening of the structure's joints over that of the support's material",
+            meaning="softening of the structure's joints over that of their material; a shaft's beams have all of theirs",
             source="1 for parts bending; half for steel screws in aluminium, 0 where contact pressure, not modulus, makes the stiffness",
         ),
     ),

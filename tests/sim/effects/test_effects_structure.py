@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy.special import jn_zeros
 
+from tests.conftest import ROOT
 from tests.effect_points import REST, at
 from thermospindle.model.bearing.row import contact_constants
 from thermospindle.model.machine import Condition
 from thermospindle.model.material import Law
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
 from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.model.scene.reading import load
 from thermospindle.model.structure import Body
 from thermospindle.sim.effects.structure import (
     added_disk,
@@ -100,6 +102,17 @@ def test_modulus_softening_scales_joints_and_contacts(spindle):
     soft = contact_constants(point.spindle, point.spindle.bearing("upper"), motion, 0.43)
     hard = contact_constants(spindle, spindle.bearing("upper"), motion, 0.43)
     assert np.divide(soft, hard) == pytest.approx(1 - 40 * 22 * 11.5e-6, rel=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0, 2.0])
+def test_modulus_softening_of_a_shaft_is_that_of_its_material(share):
+    """However much of its material's fall a joint has: a steel shaft bent by nothing of it, or by twice that."""
+    bending = load(ROOT / "scenes" / "five_bearing")
+    ratio = joints_ratio(bending, at(bending, REST, modulus_softening, joint_share=share))
+    fallen = modulus_softening.softening(bending.materials["steel"], REST.temperature, bending.reference_temperature)
+    beams = [ratio[name] for s in bending.structure.shafts if s.turns for name in s.elements]
+    assert fallen < 0.995
+    assert beams == pytest.approx([fallen] * len(beams), rel=1e-12)
 
 
 def test_modulus_softening_of_everything_alike_scales_all_frequencies(spindle):
