@@ -178,8 +178,9 @@ class Response:
 
     def by_law(self, kind: int) -> ComplexArray:
         """Derivative (n_resp, n_ref, L) by how far what loss factors lose (0), or dampers (1), is the same at all frequencies."""
-        law = replace(self._law, factors=float(kind == 0), dampers=float(kind == 1))
-        return self._answering(sum(-by_law * _over(self._onto(lost).T, self._driven) for by_law, lost in zip(law.over(self.s), self._lost, strict=True) if by_law.any()))
+        added = replace(self._law, factors=1.0, dampers=1.0).over(self.s)
+        own = ((0, 1), (2,))[kind]
+        return self._answering(sum((-added[i] * _over(self._onto(self._lost[i]).T, self._driven) for i in own), np.zeros_like(self._driven)))
 
     def by_products_of_shares(self, columns: Array, rows: Integers, others: Integers) -> ComplexArray:
         """Derivatives (k, n_resp, n_ref, L) by products of two shares each of light resonances on `columns` (n, m), for one that is felt as a mass of -1 / s^2."""

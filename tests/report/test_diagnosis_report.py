@@ -152,7 +152,8 @@ def test_errors_are_those_of_the_answer(told):
 
 def test_the_law_is_that_of_the_data(told):
     found, answer = told
-    best = found.verdict.candidates[0]
+    best, learned = found.verdict.candidates[0], found.verdict.candidates[0].hypothesis.evidence.learned
+    best = replace(best, hypothesis=replace(best.hypothesis, evidence=replace(best.hypothesis.evidence, learned=replace(learned, departures=(0.3,)))))  # of sizes that may differ
     drawn = np.concatenate([line.get_ydata() for line in law(found, best).axes[0].lines if line.get_label() == "_nolegend_" or line.get_marker() in "os^"])
     for row in answer["candidates"][0]["law"]["soak_lag"]:
         assert np.min(np.abs(drawn - row["size"])) < 1e-12
