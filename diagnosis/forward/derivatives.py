@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.linear import Linear, Pairs, Rates, between_of, pairs, same_chain, together
+from thermospindle.diagnosis.forward.linear import Linear, Pairs, Rates, change_between, pairs, same_chain, together
 from thermospindle.diagnosis.forward.measuring import aside, askew, hammer_gain
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.points import Applied
@@ -151,7 +151,7 @@ def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Appli
     """
     (at, answer), moved = model.standing(t, x, first), model.linear(t, x, second)
     if at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain):
-        by = between_of(at, moved, apart)
+        by = change_between(at, moved, apart)
         return answer.moved(by)[0] if isinstance(answer, Table) else model.whitened(t, answer.moved(by)[0], 0.0)
     return (model.in_errors(t, model.answer(t, x, moved)) - model.in_errors(t, answer)) / apart
 

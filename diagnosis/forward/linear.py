@@ -87,7 +87,7 @@ def mass_changes(spindle: Spindle, terms: Sequence[MassTerm], dofs: Dofs) -> tup
 class Products:
     """Changes of M, C and K by `count` parameters as sums of few products of two vectors, for an element moves few degrees of freedom: the change of
     the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first; a power from `BY_LAW` on stands for
-    what a law of damping has in its place (`Response.law`)."""
+    what a law of damping has in its place (`response.Law`)."""
 
     count: int
     of: Integers
@@ -152,7 +152,7 @@ class Rates:
         return {"numbers": self.numbers, "each": self.each, "dofs": self.dofs}
 
 
-def between_of(at: Linear, moved: Linear, apart: float) -> Products:
+def change_between(at: Linear, moved: Linear, apart: float) -> Products:
     """The products of what differs between the matrices of two linear models so far `apart`."""
     mass, damping, stiffness = ((getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness"))
     return products(mass, damping, stiffness, None if at.lost is None or moved.lost is None else (moved.lost - at.lost) / apart)

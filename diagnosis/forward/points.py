@@ -105,7 +105,7 @@ def _by_orbits(spindle: Spindle, bearings: Sequence[BearingState], share: float)
 
 
 def uneven(shares: Sequence[tuple[Unevenness, float]]) -> tuple[Effect, Values]:
-    """Joints stiffer by a share one way and less stiff by as much across, to first order: K -> S K S, damping with it."""
+    """Joints stiffer by a share one way and less stiff by as much across, or segments of a shaft stiffer by it, to first order: K -> S K S, damping with it."""
     by_joint: dict[str, Array] = {}
     for u, share in shares:
         for joint, pattern in u.patterns:

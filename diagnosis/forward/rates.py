@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.linear import Rates, between_of, products
+from thermospindle.diagnosis.forward.linear import Rates, change_between, products
 from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
 from thermospindle.model.types import Array
 
@@ -37,7 +37,7 @@ def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old:
                 apart = -STEP
             if moved.matrices.dofs != at.dofs:
                 moved = base
-            found.append(between_of(base, moved, apart))
+            found.append(change_between(base, moved, apart))
         masses = zip(*model.heavier(at.dofs), strict=True)
         found += kept[len(own) :] or [products(mass, speed * gyroscopic, np.zeros_like(mass)) for mass, gyroscopic in masses]
         numbers.append(np.array([*own, *model.numbers.masses]))
