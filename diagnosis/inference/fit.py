@@ -63,7 +63,7 @@ class Fit:
     information: Array
     by_test: tuple[tuple[float, Array, Array], ...]
     count: int
-    rates: Rates
+    rates: Rates | None  # None of one that has travelled: those of a flexible shaft are a hundred times as large as all else (`rated`)
     temper: float
     moved: Array = field(default_factory=lambda: UNMOVED)  # (1 + mechanisms, tests, 2, modes), of frequency and damping of every mode, relative
     held: tuple[Held, ...] = ()
@@ -76,6 +76,11 @@ class Fit:
     @property
     def nuisance(self) -> Array:
         return self.point[: len(self.point) - sum(len(r) + len(m.shape) for r, m in zip(self.roots, self.mechanisms, strict=True))]
+
+
+def rated(model: CampaignModel, fit: Fit) -> Fit:
+    """A fit with the rates at its point."""
+    return fit if fit.rates is not None else replace(fit, rates=rates_of(model, fit.nuisance, Problem(model, fit.mechanisms).effects_of(fit.point)))
 
 
 def fit(

@@ -10,7 +10,7 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
-from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit, rated
 from thermospindle.diagnosis.inference.prior import Learned, steady
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
@@ -36,6 +36,11 @@ class Hypothesis:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {' + '.join(self.names) or 'none'}: ln evidence {self.evidence.ln:.1f}>"
+
+    @property
+    def light(self) -> Hypothesis:
+        """Without the rates of its fit, to be sent and kept."""
+        return replace(self, fit=replace(self.fit, rates=None))
 
     @property
     def mechanisms(self) -> tuple[Mechanism, ...]:
@@ -81,7 +86,9 @@ def fitted(
     model, tasks, tempers, about: Fit, most: float, expected: Learned, workers, afresh: bool = False, beaten: float = np.inf
 ) -> list[Hypothesis]:
     """All that can be built. None should cost more than `most`, and what costs more than is `beaten` need not end exactly."""
-    found = in_parallel(partial(_fit_one, model, about.rates, tuple(tempers), most, expected, afresh, min(most, beaten)), tasks, workers)
+    if not tasks:
+        return []
+    found = in_parallel(partial(_fit_one, model, rated(model, about).rates, tuple(tempers), most, expected, afresh, min(most, beaten)), tasks, workers)
     return [
         Hypothesis(replace(h.fit, mechanisms=task.mechanisms), h.evidence) for h, task in zip(found, tasks, strict=True) if h is not None
     ]
@@ -102,7 +109,7 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
             again = fit(model, mechanisms, as_drawn(model, task.starts[0]), rates, TEMPERS[1:], learned=prior, beaten=beaten)
             if again.cost < found.cost:
                 reached = Hypothesis(again, evidence(model, again))
-        return None if reached.evidence.rounded else reached
+        return None if reached.evidence.rounded else reached.light
     except FAILED:
         return None
 

@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence, integrated
-from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.fit import Fit, rated
 from thermospindle.diagnosis.inference.gaussian import Nuisances, impossible
 from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
@@ -58,7 +58,7 @@ def screen(
 ) -> list[Screened]:
     """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`, or smaller;
     and the best of each name, and kind of law, once more with its shape `turned`."""
-    about = replace(about, temper=temper)
+    about = replace(rated(model, about), temper=temper)
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0)
     prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors), about.moved)
     at = linearised(model, about)  # where a fit has not arrived its own derivatives are of an earlier point
@@ -77,7 +77,9 @@ def linearised(model: CampaignModel, about: Fit) -> Linearisation:
     key = about.point.tobytes(), tuple(m.variant for m in about.mechanisms), about.held
     if key not in model.kept:
         model.kept.clear()
-        model.kept[key] = Problem(model, about.mechanisms).linearisation(about.point, about.rates, np.array([h.number for h in about.held], int))
+        rates = rated(model, about).rates
+        assert rates is not None
+        model.kept[key] = Problem(model, about.mechanisms).linearisation(about.point, rates, np.array([h.number for h in about.held], int))
     return model.kept[key]
 
 

@@ -132,11 +132,15 @@ def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Se
 
 def _ended(model: CampaignModel, best: float, found: Sequence[Hypothesis], workers: int | None) -> list[Hypothesis]:
     """Each fitted anew, with the very mechanisms that it has here, beside the `best` ln evidence so far."""
-    ended = in_parallel(partial(_at_the_end, model, best), found, workers)
+    ended = in_parallel(partial(_at_the_end, model, best), [h.light for h in found], workers)
     return [replace(e, fit=replace(e.fit, mechanisms=h.mechanisms)) for e, h in zip(ended, found, strict=True)]
 
 
 def _at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:
+    return _settled_at_the_end(model, best, h).light
+
+
+def _settled_at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:
     if h.mechanisms:  # without any it is settled
         h = settled(model, h, best)
         if not h.free and any(m.shape for m in h.mechanisms) and farthest_tolerance(model, h.fit.point) > STRAINED:

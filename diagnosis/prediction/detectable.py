@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 from thermospindle.diagnosis.forward.model import Applied, CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
-from thermospindle.diagnosis.inference.fit import Fit, promised
+from thermospindle.diagnosis.inference.fit import Fit, promised, rated
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Point, Problem, built
@@ -48,7 +48,7 @@ def smallest(
             size = abs(m.size.typical - m.size.neutral) * np.sqrt(2 * ASKED) / s.visibility
             best[m.name] = min(best.get(m.name, (np.inf, m)), (size, m), key=lambda row: row[0])
     tasks = list(best.values())
-    sizes = in_parallel(partial(_smallest, model.thinned, about, learned), tasks, workers)
+    sizes = in_parallel(partial(_smallest, model.thinned, rated(model, about), learned), tasks, workers)
     return {m.name: (m, size) for (_, m), size in zip(tasks, sizes, strict=True) if size is not None}
 
 
@@ -156,7 +156,8 @@ def _beside(problem: Problem, about: Fit, base: Linearisation, moved: Sequence[A
     left = [-d for d in moved]
     nothing = Point(np.zeros(len(start)), left, problem.cost(np.zeros(len(start)), 1.0, left))
     here = min(nothing, at(start), key=lambda point: point.cost) if start.any() else nothing
-    lines, rates, current, holds = base, about.rates, True, True
+    rates = first = rated(model, about).rates
+    lines, current, holds = base, True, True
     for _ in range(STEPS):
         slope, normal = lines.slope(problem, here, 1.0), problem.precision + lines.information
         move = problem.step(here.p, slope, normal)
@@ -168,9 +169,10 @@ def _beside(problem: Problem, about: Fit, base: Linearisation, moved: Sequence[A
         if (current or holds) and hoped < NEAR * here.cost:
             break
         if current:
-            if rates is not about.rates:
+            if rates is not first:
                 break
             rates = rates_of(model, about.nuisance + here.p, [[] for _ in model.tests], rates)  # it is not the lines that are old
+        assert rates is not None
         lines, current, holds = problem.linearisation(about.nuisance + here.p, rates), True, True
     return here
 
