@@ -228,11 +228,11 @@ def losses(chain: RotorBase, at: Matrices) -> Array:
     matrices `at` have for it, and that of its dampers."""
     n = len(chain.dofs)
     dampers = _felt(chain, n)[0] if chain.elements else np.zeros((n, n))
-    constant = np.zeros((n, n))
-    for e in chain.elements:
-        if e.loss_factor:
-            constant += element_rows(chain, e).T @ e.lossy @ element_rows(chain, e)
-    return np.array([constant, (at.damping + at.damping.T) / 2 - dampers, dampers])
+    constant, by_loss = np.zeros((2, n, n))
+    if lossy := [e for e in chain.elements if e.loss_factor]:
+        constant += sum(element_rows(chain, e).T @ e.lossy @ element_rows(chain, e) for e in lossy)
+        by_loss += (at.damping + at.damping.T) / 2 - dampers  # without any it would be rounding, of as many products as there are degrees of freedom
+    return np.array([constant, by_loss, dampers])
 
 
 @lru_cache(maxsize=64)
