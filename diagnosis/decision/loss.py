@@ -2,7 +2,8 @@
 
 In units of a set that holds the truth: a wrong name costs ten times as much and a false alarm twenty times; to say "nothing" of a spindle that lacks
 something five times, as much as a set without the truth in it does beyond its own cost; and as much as such a set to say that something else is missing where it
-is an effect of the catalogue.
+is an effect of the catalogue. Where effects act and something unknown beside them, an answer costs more by what it leaves unsaid: half a set by the smaller of the two, three sets by
+the larger.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ def least_loss(
     something = 1 - none
     losses: dict[str, float] = {"none": MISSED * something}
     answers: dict[str, tuple[str, Names]] = {"none": ("none", ())}
-    p_beside = sum(c.probability for c in beside)
     alone = {frozenset(c.names): c.delta_evidence for c in candidates}
+    mostly = {c for c in beside if mostly_named(c, alone)}
 
     def missed(own: set[str], at_worst: float) -> float:
         """Of names where something unknown is true: half right where it changes what they change, by another law."""
@@ -38,7 +39,7 @@ def least_loss(
         loss = FALSE_ALARM * none + missed(own, WRONG)
         for c in (*candidates, *beside):
             of_it = set(named_part(c))
-            whole = 0.0 if not c.free else SET / 2 if mostly_named(c, alone) else HALF
+            whole = 0.0 if not c.free else SET / 2 if c in mostly else HALF
             loss += c.probability * (whole if own == of_it else HALF if own < of_it else WRONG)
         return loss
 
@@ -55,14 +56,16 @@ def least_loss(
         chosen.append(c)
     names = tuple(dict.fromkeys(n for c in chosen for n in named_part(c)))
     if len(names) > 1:
-        share = sum(c.probability for c in chosen if not c.free)
-        half = sum(c.probability for c in chosen if c.free)
+        share = sum(c.probability for c in chosen if not c.free or c in mostly)
+        little = sum(c.probability for c in chosen if c in mostly)
+        half = sum(c.probability for c in chosen) - share
         outside = sum(c.probability for c in explained) - share - half
         key = "one of " + ", ".join(names)
-        losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + HALF * half
+        losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + SET / 2 * little + HALF * half
         losses[key] += (SET + MISSED) * outside + missed(set(names), SET + MISSED)
         answers[key] = ("ambiguous", names)
-    losses["unexplained"] = FALSE_ALARM * none + (SET + MISSED) * sum(c.probability for c in candidates) + SET * p_beside
+    losses["unexplained"] = FALSE_ALARM * none + (SET + MISSED) * sum(c.probability for c in candidates)
+    losses["unexplained"] += sum(c.probability * (HALF if c in mostly else SET) for c in beside)
     answers["unexplained"] = ("unexplained", ())
     best = min(losses, key=lambda k: losses[k])
     return *answers[best], losses

@@ -11,7 +11,7 @@ import pytest
 from tests.hand_made_search import made, total
 from thermospindle.diagnosis.decision import reason, verdict
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.loss import FALSE_ALARM, MISSED, WRONG
+from thermospindle.diagnosis.decision.loss import FALSE_ALARM, HALF, MISSED, SET, WRONG
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.parameters.nuisance import (
     BUILD,
@@ -115,6 +115,17 @@ def test_a_set_has_what_its_names_have_with_a_little_drift_beside_them():
     assert share > 0.95
     assert f"(together {share:.0%} probable)" in v.reason
 
+
+def test_an_answer_costs_by_the_part_that_it_leaves_unsaid():
+    """Two names that do as well, each with a little drift beside it and hardly without: to say that something unknown drifts leaves the larger part unsaid, a set of
+    the names the smaller."""
+    v = decide(made({"a": 90.0, "b": 90.0, "~x": 20.0, ("a", "~x"): 110.0, ("b", "~x"): 110.0}))
+    assert (v.word, set(v.effects)) == ("ambiguous", {"a", "b"})
+    assert v.losses["unexplained"] == pytest.approx(HALF, rel=1e-3)
+    assert v.losses["one of a, b"] == pytest.approx(SET + SET / 2, rel=1e-3)
+    mostly = decide(made(CASES["mostly drift, with a name beside"][0]))
+    assert mostly.losses["unexplained"] == pytest.approx(SET, rel=1e-3)
+    assert mostly.losses["a"] == pytest.approx(HALF, rel=1e-3)
 
 
 def test_a_set_holds_only_what_is_probable():
