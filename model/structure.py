@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import pi
 
 from thermospindle.model.shaft import Shaft
 
@@ -54,6 +55,10 @@ class Structure:
     inner_body: str = ""  # the bodies that carry the rings of bearings that name none of their own
     outer_body: str = ""
     shafts: tuple[Shaft, ...] = ()  # those whose nodes and elements are among `bodies` and `joints`
+
+    def damping_time(self, ratio: float) -> float:
+        """Damping over stiffness (s) of what has this damping ratio."""
+        return 2 * ratio / (2 * pi * self.damping_frequency)
 
     @property
     def turns(self) -> bool:

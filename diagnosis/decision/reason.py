@@ -14,7 +14,7 @@ from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
 from thermospindle.diagnosis.inference.resonance import moving, shown
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
-from thermospindle.diagnosis.parameters.nuisance import Resonance
+from thermospindle.diagnosis.parameters.nuisance import Nuisance, Resonance
 from thermospindle.model.built.tolerance import LEAST, MOST
 from thermospindle.model.errors import listed
 
@@ -179,10 +179,15 @@ def of_motions(model: CampaignModel, best: Hypothesis) -> str:
 
 def of_conventions(model: CampaignModel, best: Hypothesis) -> str:
     """What honest programs do otherwise than this one, and the data do as far as can be told."""
-    errors = np.sqrt(np.maximum(np.diag(best.evidence.covariance), 0.0))
-    rows = [(float(best.evidence.mean[i]) * q.sd, float(errors[i]) * q.sd, CONVENTIONS[q.kind, max(q.index, 0)]) for i, q in enumerate(model.parameters) if q.kind in (kinds_of.LAW, kinds_of.ORBITS)]
-    told = [f"{what} ({value:.2f} +- {sd:.1g} of the way from one to the other)" for value, sd, what in rows if value > max(SAME * sd, LITTLE_OF_THE_WAY)]
+    rows = [(CONVENTIONS[q.kind, max(q.index, 0)], value, sd) for q, value, sd in conventions(model, best)]
+    told = [f"{what} ({value:.2f} +- {sd:.1g} of the way from one to the other)" for what, value, sd in rows if value > max(SAME * sd, LITTLE_OF_THE_WAY)]
     return f" Taken into account: {'; '.join(told)}." if told else ""
+
+
+def conventions(model: CampaignModel, best: Hypothesis) -> list[tuple[Nuisance, float, float]]:
+    """How far the data have it otherwise than this program where honest ones differ, with errors: 0 as this one, 1 as the others."""
+    errors = np.sqrt(np.maximum(np.diag(best.evidence.covariance), 0.0))
+    return [(q, float(m) * q.sd, float(s) * q.sd) for q, m, s in zip(model.parameters, best.evidence.mean, errors, strict=False) if q.kind in (kinds_of.LAW, kinds_of.ORBITS)]
 
 
 def of_what_is_left(best: Hypothesis, same: Overlap) -> str:

@@ -67,8 +67,8 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     record = [] if model.numbers.record is None else [model.numbers.record]
     lights = model.lights(t, linear.matrices.dofs, x)
     channels, hammers, ways = (_alike(model, *which[t]) for which in (model.numbers.gains, model.numbers.hammers, model.numbers.misses))
-    glued = _alike(model, *model.numbers.sensors)
-    shared += [_each(model.numbers.law[0]), channels, hammers, ways, glued, _each(np.array(record, int)), *(_alike(model, n, n) for _, n in lights)]
+    glued, late = _alike(model, *model.numbers.sensors), _alike(model, *model.numbers.delays)
+    shared += [_each(model.numbers.law[0]), channels, late, hammers, ways, glued, _each(np.array(record, int)), *(_alike(model, n, n) for _, n in lights)]
     numbers, of, times = _after_each_other(shared)
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd
@@ -84,8 +84,9 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
             at = fill(at, moved)
     for kind in model.numbers.law[1]:
         at = fill(at, response.by_law(int(kind))[None])
-    for c in np.unique(model.numbers.gains[t][1]):
-        at = fill(at, np.where((model.numbers.channel_of[t][:n_resp] == c)[:, None, None], response.value, 0.0)[None])
+    for by, (_, channel) in ((response.value, model.numbers.gains[t]), (-2j * np.pi * data.frequency * response.value, model.numbers.delays)):
+        for c in np.unique(channel):
+            at = fill(at, np.where((model.numbers.channel_of[t][:n_resp] == c)[:, None, None], by, 0.0)[None])
     for h in np.unique(model.numbers.hammers[t][1]):
         at = fill(at, np.where((model.numbers.hammer_of[t] == h)[:, None], response.value, 0.0)[None])
     missing, struck_by, way = aside(model.operating(t, x, effects)), model.numbers.hammer_of[t], np.unique(model.numbers.misses[t][1])

@@ -1,4 +1,4 @@
-"""The measuring chain of a test: sensors off their places and directions, hammers that miss their points, gains of both."""
+"""The measuring chain of a test: sensors off their places and directions, channels that are late, hammers that miss their points, gains of both."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WAYS = 0.0, np.pi / 2  # on a face
 
 def measured(numbers: Numbers, t: int, point: OperatingPoint, x: Array) -> Measurement:
     """The measuring chain of a point in test `t` at nuisance values x (P,), without the gains of channels."""
-    return _struck(numbers, t, point, _heard(numbers, t, point, x), x)
+    return _struck(numbers, t, point, _late(numbers, t, _heard(numbers, t, point, x), x), x)
 
 
 def channel_gain(numbers: Numbers, t: int, x: Array) -> Array:
@@ -49,6 +49,15 @@ def _heard(numbers: Numbers, t: int, point: OperatingPoint, x: Array) -> Measure
     rows = chain.response_rows.copy()
     rows[: len(of)] += np.einsum("rw,wrn->rn", each, askew(point)[:, : len(of)])
     return changed(chain, response_rows=rows)
+
+
+def _late(numbers: Numbers, t: int, chain: Measurement, x: Array) -> Measurement:
+    (number, which), of = numbers.delays, numbers.channel_of[t]
+    if not (len(of) and x[number].any()):
+        return chain
+    delay = chain.delay.copy()
+    delay[: len(of)] += np.bincount(which, x[number] * numbers.sd[number])[of]
+    return changed(chain, delay=delay)
 
 
 def _struck(numbers: Numbers, t: int, point: OperatingPoint, chain: Measurement, x: Array) -> Measurement:

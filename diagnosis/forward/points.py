@@ -11,7 +11,7 @@ from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.nuisance import CHANGES, DIRECTIONS, RANGE_K, Nuisance, Unevenness
 from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.bearing.ball_row import by_own_orbits
-from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
+from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.changed import changed
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
@@ -100,7 +100,7 @@ def _by_orbits(spindle: Spindle, bearings: Sequence[BearingState], share: float)
     found = []
     for b, drawing in zip(bearings, spindle.bearings, strict=True):
         change = share * by_own_orbits(b.row, np.array(b.displacement) if b.displacement else None)
-        found.append(changed(b, stiffness=b.stiffness + change, damping=b.damping + damping_time(spindle, drawing) * change))
+        found.append(changed(b, stiffness=b.stiffness + change, damping=b.damping + spindle.structure.damping_time(drawing.damping_ratio) * change))
     return found
 
 

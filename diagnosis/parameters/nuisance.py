@@ -48,6 +48,8 @@ PLACE, PLACE_SD = "place of a sensor", 3e-4
 ASKEW, ASKEW_SD = "direction of a sensor", 0.02
 """By how much (rad) it is turned out of its direction, the same in all tests: a degree of glueing, and a transverse sensitivity of one to three per cent by accelerometers' data sheets (at most 5 %
 is usual), which is the same to an FRF."""
+LATE, LATE_SD = "delay of a channel", 1e-7
+"""How much later (s) it is than the force, the same in all tests: of modules made for it two channels differ by some hundredths of a degree a kHz (0.045 are 0.125 us), and conditioners by as much."""
 BALLS = "stiffness of the balls"
 FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
 """Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
@@ -100,7 +102,7 @@ learned (`ODDS`)."""
 class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
-    `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain: sensors in the order in which tests first have them), the hammer, of a
+    `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain and delay: sensors in the order in which tests first have them), the hammer, of a
     miss twice that and its way, of a sensor's place and direction four times its channel and one of four ways, the material (`Spindle.used_materials`), or unused; `modes` the pair of a discrepancy.
     """
 
@@ -128,11 +130,10 @@ class Unevenness:
 def unevennesses(spindle: Spindle) -> tuple[Unevenness, ...]:
     """Of every joint whose stiffness is drawn alike against both moves across the axis, or both tilts: no joint is built so. It is stiffer against one of the two, or against their sum. And of shafts
     that bend, section by section, whose steps and fits stiffen them otherwise than their diameters say."""
-    beams = {name for s in spindle.structure.shafts for name in s.elements}
     found = []
-    for joint in spindle.structure.joints:
+    for joint in spindle.structure.own_joints:
         for first, second in ((0, 1), (3, 4)):
-            if joint.name not in beams and joint.stiffness[first] == joint.stiffness[second] > 0:
+            if joint.stiffness[first] == joint.stiffness[second] > 0:
                 one, other = (MOVES[m].replace("_", " ") for m in (first, second))
                 plain, turned = np.zeros((2, 5, 5))
                 plain[first, first], plain[second, second] = 1.0, -1.0
@@ -240,6 +241,7 @@ def nuisances(
         for c in range(channels):
             found += [Nuisance(PLACE, f"place of channel {c + 1} {way}", PLACE_SD, index=4 * c + i) for i, way in enumerate(WAYS)]
             found += [Nuisance(ASKEW, f"direction of channel {c + 1} {way}", ASKEW_SD, index=4 * c + 2 + i) for i, way in enumerate(WAYS)]
+            found.append(Nuisance(LATE, f"delay of channel {c + 1}", LATE_SD, index=c))
         ways = [(2 * h + i, f"miss of hammer {h + 1} {way}") for h in range(hammers) for i, way in enumerate(WAYS)]
         found += [Nuisance(MISS, of, MISS_SD, index=i) for i, of in ways]
         found += [Nuisance(MISS_DRIFT, f"{of} in {name}", MISS_DRIFT_SD, test=k, index=i) for k, name in drifting for i, of in ways]

@@ -148,6 +148,12 @@ class Numbers:
         own = self._of(kinds_of.PLACE, kinds_of.ASKEW)
         return own, self.places[1][own]
 
+    @cached_property
+    def delays(self) -> tuple[Integers, Integers]:
+        """The numbers of the parameters by which channels are late, and the channel of each."""
+        own = self._of(kinds_of.LATE)
+        return own, self.places[1][own]
+
     def _of_one_and_all(self, t: int, in_all: str, in_one: str) -> tuple[Integers, Integers]:
         rows = [(i, p.index) for i, p in enumerate(self.parameters) if p.kind == in_all or (p.kind == in_one and p.test == t)]
         number, index = np.array(rows, int).reshape(-1, 2).T

@@ -244,11 +244,6 @@ def contact_status(bearings: tuple[BearingState, ...]) -> str:
     return IN_CONTACT if not loose else f"{' and '.join(loose)} bearing lost contact"
 
 
-def damping_time(spindle: Spindle, b: Bearing) -> float:
-    """Damping over stiffness of a bearing (s)."""
-    return 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency)
-
-
 def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | None = None, movement: float = 0.0) -> BearingState:
     """What bearing `b` is with its balls as in `row`: centred rings at their loaded position, after a rigid `movement` (m) of the outer one.
 
@@ -271,7 +266,7 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
         ball_stiffness=1.5 * row.constant * max(answer.deformation, 0.0) ** 0.5,
         preload=b.sense * answer.axial_force,
         stiffness=stiffness,
-        damping=damping_time(spindle, b) * stiffness,
+        damping=spindle.structure.damping_time(b.damping_ratio) * stiffness,
         row=row,
         in_contact=answer.ball_force > max(felt, 0.0),
         outer_contact_force=answer.outer_ball_force,

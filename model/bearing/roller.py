@@ -179,5 +179,5 @@ def state_at(spindle: Spindle, b: RollerBearing, row: RollerRow, displacement: A
     """What a bearing with these rollers is, centred or at a displacement (5,) of its outer ring against its inner one."""
     u = np.zeros(5) if displacement is None else displacement
     answer = respond(row, u)
-    damping = 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * answer.tangent
+    damping = spindle.structure.damping_time(b.damping_ratio) * answer.tangent
     return RollerState(b.name, b.z, answer.tangent, damping, row.clearance, answer.load, row, tuple(float(x) for x in u))

@@ -90,4 +90,4 @@ def linear_state(spindle: Spindle, b: LinearBearing, condition: Condition) -> Li
     p, q = at[0] - i, at[1] - j
     i1, j1 = min(i + 1, grid.shape[0] - 1), min(j + 1, grid.shape[1] - 1)
     k = (1 - p) * ((1 - q) * grid[i, j] + q * grid[i, j1]) + p * ((1 - q) * grid[i1, j] + q * grid[i1, j1])
-    return LinearState(b.name, b.z, k, 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * k)
+    return LinearState(b.name, b.z, k, spindle.structure.damping_time(b.damping_ratio) * k)

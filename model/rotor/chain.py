@@ -131,14 +131,15 @@ def sprung(chain: RotorBase, names: Sequence[str], rate: float, mass: float) -> 
 
 
 def joint_element(structure: Structure, index: int) -> Element:
-    return _joint_element(structure.joints[index], structure.damping_frequency)
+    joint = structure.joints[index]
+    return _joint_element(joint, structure.damping_time(joint.damping_ratio))
 
 
 @lru_cache(maxsize=1024)
-def _joint_element(joint: Joint, damping_frequency: float) -> Element:
+def _joint_element(joint: Joint, damping_time: float) -> Element:
     """Read only."""
     stiffness = np.diag(joint.stiffness)
-    damping = 2 * joint.damping_ratio / (2 * np.pi * damping_frequency) * stiffness
+    damping = damping_time * stiffness
     for matrix in (stiffness, damping):
         matrix.flags.writeable = False
     return Element(joint.name, joint.group, *joint.bodies, joint.z, stiffness, damping, loss_factor=joint.loss_factor)

@@ -16,7 +16,7 @@ import scipy
 from thermospindle.model.bearing import ball_row, roller
 from thermospindle.model.bearing.ball_row import BallRow
 from thermospindle.model.bearing.definitions import BearingSet
-from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
+from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.bearing.state import LinearState
 from thermospindle.model.carrier import load_carrier
@@ -193,7 +193,7 @@ def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
         ball_stiffness=1.5 * b.row.constant * max(float(answer.deformation[most]), 0.0) ** 0.5,
         preload=spindle.bearing(b.name).sense * float(answer.force[2]),
         stiffness=stiffness,
-        damping=damping_time(spindle, spindle.bearing(b.name)) * stiffness,
+        damping=spindle.structure.damping_time(spindle.bearing(b.name).damping_ratio) * stiffness,
         in_contact=bool(answer.in_contact.any()),
         displacement=tuple(float(x) for x in q),
         radial_force=(float(answer.force[0]), float(answer.force[1])),

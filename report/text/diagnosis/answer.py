@@ -11,6 +11,7 @@ from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.errors import arrived, as_drawn, whole
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.decision.loss import NAMING
+from thermospindle.diagnosis.decision.reason import conventions
 from thermospindle.diagnosis.inference.evidence import Evidence, left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.resonance import shown
@@ -80,11 +81,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         },
         "tolerances_beside": list(v.told.names),
         "learned": _learned(v.told.evidence),
-        "conventions": {
-            p.name: {"value": float(m) * p.sd, "sd": float(s) * p.sd}
-            for p, m, s in zip(d.search.model.parameters, v.told.evidence.mean, _sd(v.told.evidence), strict=False)
-            if p.kind in (kinds_of.LAW, kinds_of.ORBITS)
-        },
+        "conventions": {p.name: {"value": value, "sd": sd} for p, value, sd in conventions(d.search.model, v.told)},
         "light_resonances": [{"frequency_Hz": r.frequency, "damping_ratio": r.damping} for r in shown(d.search.model, d.search.hypotheses[0])],
         "noise": {data.test.id: getattr(data, "noise_from", "the table of modes") for data in d.search.model.tests},
     }

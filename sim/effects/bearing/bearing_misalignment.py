@@ -19,11 +19,10 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
     tilt = values["tilt"] * 1e-3
     if tilt == 0.0:
         return state
-    omega = 2 * np.pi * spindle.structure.damping_frequency
     along, across, direction = values["lower_share"], values["lower_across"], np.radians(values["direction"])
     upper, lower = (1.0, direction), (float(np.hypot(along, across)), direction + float(np.arctan2(across, along)))
     bearings = tuple(
-        tilted(b, share * tilt, axis, 2 * drawing.damping_ratio / omega)
+        tilted(b, share * tilt, axis, spindle.structure.damping_time(drawing.damping_ratio))
         for b, drawing, (share, axis) in zip(state.bearings, spindle.bearings, [lower] * (len(state.bearings) - 1) + [upper], strict=True)
     )
     return replace(state, bearings=bearings, status=contact_status(bearings))

@@ -31,7 +31,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     model, x = made(scene, quantity=quantity, window_decay=decay)
     worst = worst_by_kind(model, 1, x)
     assert set(worst) == set(KINDS) - {kinds_of.FLUNG, kinds_of.ORBITS}  # these scenes' balls have none
-    for kind in (kinds_of.LAW, kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.PLACE, kinds_of.ASKEW, kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.MASSES, kinds_of.RECORD):
+    for kind in (kinds_of.LAW, kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.PLACE, kinds_of.ASKEW, kinds_of.LATE, kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.MASSES, kinds_of.RECORD):
         assert worst[kind] < 1e-4, kind
     for kind in (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.TEMPERATURE):
         assert worst[kind] < 5e-3, kind
@@ -160,23 +160,26 @@ def test_parameters_of_other_tests_do_not_move_a_test(scene):
 
 
 @pytest.mark.parametrize("rows", [(3, 1, 2), (2, 3)])
-def test_gains_go_with_sensors_and_not_with_rows(rows):
+def test_gains_and_delays_go_with_sensors_and_not_with_rows(rows):
     """Sensors in another order in the second test, or one of them missing: at what was put in nothing is left, and derivatives are those of the residual."""
     scene, each, frequency = load(SCENES["symmetric"]), {1: 0.03, 2: -0.02, 3: 0.05}, np.arange(400.0, 3000.1, 200.0)
+    late = {1: 1e-7, 2: 3e-7, 3: -2e-7}  # s
     tests = []
     for t, own in enumerate(((1, 2, 3), rows)):
         test = virtual_campaign(scene, CONDITIONS[:1], t, responses=own, references=(1,), frequency=frequency, noise=NOISELESS).tests[0]
-        gain = np.exp([each[n] for n in own])[:, None, None]
+        gain = np.exp(np.array([each[n] for n in own])[:, None] - 2j * np.pi * frequency * np.array([late[n] for n in own])[:, None])[:, None]
         tests.append(replace(test, id=f"t{t}", frf=replace(test.frf, value=test.frf.value * gain)))
     campaign = virtual_campaign(scene, CONDITIONS[:1], 0, references=(1,), frequency=frequency)
     model = model_of(scene, replace(campaign, tests=tuple(tests)))
-    gains = [i for i, p in enumerate(model.parameters) if p.kind == kinds_of.GAIN]
-    assert len(gains) == 3
+    gains, delays = ([i for i, p in enumerate(model.parameters) if p.kind == kind] for kind in (kinds_of.GAIN, kinds_of.LATE))
+    assert len(gains) == len(delays) == 3
     x = np.zeros(len(model.parameters))
-    x[gains] = np.array(list(each.values())) / model.parameters[gains[0]].sd
+    for own, put in ((gains, each), (delays, late)):
+        x[own] = np.array(list(put.values())) / model.parameters[own[0]].sd
     assert np.abs(model.residual(1, x, [])).max() < 1e-6
     assert np.abs(model.residual(1, 0 * x, [])).max() > 1
     assert worst_by_kind(model, 1, x)[kinds_of.GAIN] < 1e-4
+    assert worst_by_kind(model, 1, x)[kinds_of.LATE] < 1e-4
 
 
 @pytest.mark.parametrize("columns", [(3, 1), (3,), (1, 3)])

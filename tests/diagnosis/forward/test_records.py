@@ -31,7 +31,8 @@ def test_records_that_end_early(scene, before):
     test = replace(data.test, pretrigger=before)
     at_lines = replace(data, test=test, frequency=lines, value=np.zeros((*data.value.shape[:2], len(lines)), complex))
     gain = np.ones(len(rows.gain))
-    exact = residue @ ((1 - np.exp(-away * (duration - before))) / away) * rows.gain[:, None, None]
+    later = np.exp(-2j * np.pi * lines * rows.delay[:, None])
+    exact = residue @ ((1 - np.exp(-away * (duration - before))) / away) * (rows.gain[:, None] * later)[:, None]
     cut, uncut = (Response(linear, at_lines, gain, share).value for share in (1.0, 0.0))
     assert np.abs(cut - exact).max() < 1e-9 * np.abs(exact).max()
     assert np.abs(uncut - exact).max() > 1e-3 * np.abs(exact).max()
