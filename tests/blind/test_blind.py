@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.blind.alike import left, right, right_names
-from tests.blind.campaigns import HAMMERS_FROM, MASSES_FROM, SENSORS_FROM, campaign, further, glued, in_contact, measured
+from tests.blind.campaigns import CONVENTIONS_FROM, HAMMERS_FROM, MASSES_FROM, SENSORS_FROM, campaign, further, glued, in_contact, measured
 from tests.blind.departures import ways_of_mass
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
@@ -76,7 +76,45 @@ def test_every_difference_of_the_world_changes_the_frf():
         assert np.abs(answer(spindle, Condition(WARM), world).frf(LINES) - base).max() > 1e-5 * np.abs(base).max(), world
     polar, fast = World(masses=tuple(0.01 * np.eye(ways_of_mass(spindle))[18])), Condition(WARM, spindle.nominal_speed)
     base = answer(spindle, fast, World()).frf(LINES)
-    assert np.abs(answer(spindle, fast, polar).frf(LINES) - base).max() > 1e-4 * np.abs(base).max()
+    for world in (polar, World(hysteretic=1.0)):
+        assert np.abs(answer(spindle, fast, world).frf(LINES) - base).max() > 1e-4 * np.abs(base).max()
+
+
+@pytest.mark.parametrize("scene", [SCENES[0], FURTHER])
+def test_a_damper_and_a_complex_stiffness_lose_as_much_at_one_frequency(scene):
+    """FRFs of either law are the same there, and of a complex stiffness another elsewhere; line by line, also where dampers go by poles."""
+    spindle = load(ROOT / scene)
+    at = np.array([spindle.structure.damping_frequency, 0.7 * spindle.structure.damping_frequency])
+    condition = Condition(WARM, 0.5 * spindle.nominal_speed)
+    dampers, alike = (answer(spindle, condition, World(hysteretic=share)).frf(at) for share in (0.0, 1.0))
+    apart = np.abs(alike - dampers).max(axis=(0, 1)) / np.abs(dampers).max(axis=(0, 1))
+    assert apart[0] < 1e-8
+    assert apart[1] > 1e-4
+
+
+def test_what_honest_programs_do_otherwise_is_in_later_worlds():
+    """Channels that are late, balls on orbits of their own at speed alone, losses of a complex stiffness where lines are not from records in time; all among what may stand in."""
+    drawn, record = draw(948), Record("line", told="noise", times=1e-9)
+    worlds = [further(World(), seed, drawn.spindle) for seed in range(CONVENTIONS_FROM, CONVENTIONS_FROM + 20)]
+    assert {w.late for w in worlds} == {0.0, 3e-8, 1e-7}
+    assert {w.own_orbits for w in worlds} == {True, False}
+    assert {w.hysteretic for w in worlds} == {0.0, 0.5, 1.0}
+    before = further(World(), CONVENTIONS_FROM - 1, drawn.spindle)
+    assert (before.late, before.own_orbits, before.hysteretic) == (0.0, False, 0.0)
+    machine = load(ROOT / FURTHER)
+    for speed, least, most in ((0.0, 0.0, 1e-12), (machine.nominal_speed, 1e-3, 1.0)):
+        plain, own = (answer(machine, Condition(WARM, speed), World(own_orbits=w)).frf(LINES) for w in (False, True))
+        assert least <= np.abs(own - plain).max() / np.abs(plain).max() <= most
+    plain = campaign(drawn.spindle, drawn.tests, (), 948, World(), record)
+    late = campaign(drawn.spindle, drawn.tests, (), 948, World(late=1e-7), record)
+    for a, b in zip(plain.campaign.tests, late.campaign.tests, strict=True):
+        turned = np.angle(b.frf.value / a.frf.value) / (2 * np.pi * a.frf.frequency)
+        told = np.abs(a.frf.value) > 1e-6 * np.abs(a.frf.value).max()
+        each = [own[here] for own, here in zip(turned, told, strict=True) if here.any()]
+        assert max(map(np.ptp, each)) < 1e-10 < max(np.abs(own).max() for own in each) < 4e-7
+    assert seen(late, drawn.spindle).columns.shape[1] == seen(plain, drawn.spindle).columns.shape[1] + len(drawn.spindle.points)
+    in_time = campaign(drawn.spindle, drawn.tests, (), 948, World(hysteretic=1.0), Record("rectangular", 0.3, 1.0, 4, "nothing", 1.0))
+    assert in_time.world.hysteretic == 0.0
 
 
 def test_hammers_of_later_worlds_have_gains_of_their_own():

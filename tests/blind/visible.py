@@ -137,6 +137,14 @@ def seen(made: Made, spindle: Spindle, lines: int = 320) -> Seen:
             further = [tuple(np.array(own) + by * sd * SMALL * off) for by in (1, -1)]
             more, less = (all_tests(made.built, world=replace(plain, **{which: values})) for values in further)
             columns.append(column(more, less) / (2 * SMALL))
+    for i in range(len(spindle.points) if made.world.late else 0):
+        pick = (np.arange(len(spindle.points)) == i)[:, None, None]
+        columns.append(column([b * (1 - 2j * np.pi * frequency * made.world.late * pick) for b in base]))
+    if made.world.hysteretic:
+        more, less = (all_tests(made.built, world=replace(plain, hysteretic=plain.hysteretic + by * SMALL)) for by in (1, -1))
+        columns.append(column(more, less) / (2 * SMALL))
+    if made.world.own_orbits:
+        columns.append(column(all_tests(made.built, world=replace(plain, own_orbits=False))))
     for name in made.built.used_materials:
         material = made.built.materials[name]
         more, less = (all_tests(with_material(made.built, expanding(material, by * COEFFICIENT_SD * SMALL))) for by in (1, -1))

@@ -18,9 +18,9 @@ from tests.blind.departures import distributed, perturbed
 from tests.blind.hidden import Hidden
 from tests.blind.hidden_structure import excited, on_spring
 from tests.blind.laws import REFERENCE, Place
-from thermospindle.model.bearing.ball_row import BallRow
+from thermospindle.model.bearing.ball_row import BallRow, by_own_orbits
 from thermospindle.model.bearing.centred import centred_axial_force
-from thermospindle.model.bearing.pair import PairState, bearing_state, contact_status
+from thermospindle.model.bearing.pair import BearingState, PairState, bearing_state, contact_status
 from thermospindle.model.bearing.row import reference_motion, row_at
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, motion_rows, rotor_base
@@ -52,6 +52,9 @@ class World:
     miss_drift: float = 0.0  # m, of it from test to test
     place: float = 0.0  # m, of each sensor beside its point, on either way, in all tests
     askew: float = 0.0  # rad, of each sensor out of its direction, alike
+    late: float = 0.0  # s, of each channel behind the force
+    own_orbits: bool = False  # each ball as fast as it rolls by itself, and not with its cage
+    hysteretic: float = 0.0  # share of what is lost that does not grow with frequency: of a complex stiffness, of FRFs that come line by line
     masses: tuple[float, ...] = ()  # by what shares bodies and shafts have their mass otherwise (`distributed`)
 
 
@@ -93,12 +96,13 @@ class Answer:
     delay: Array
     decay: float
     status: str  # "in contact", or which bearing lost contact
+    hysteretic: tuple[float, float] = (0.0, 1.0)  # share, and rad/s at which it is as much as a damper's
 
     def frf(self, frequency: Array, window: float = 0.0) -> ComplexArray:
         """Mobility (n_resp, n_ref, n) at `frequency` (Hz), by the dynamic stiffness line by line, of a flexible shaft by all its poles; the window
         is in it."""
         s = 2j * np.pi * frequency + self.decay + window
-        if len(self.linear.mass) > LARGE:
+        if len(self.linear.mass) > LARGE and not self.hysteretic[0]:
             p: Poles = poles(self.linear)
             residue = (self.responses @ p.right)[:, None, :] * (p.left @ self.references.T).T[None] * p.value
             return residue @ (1 / (s - p.value[:, None])) * self._channels(frequency)
@@ -138,7 +142,8 @@ class Answer:
     def _solved(self, s: ComplexArray, forces: Array) -> ComplexArray:
         """Displacements (lines, n, k) under `forces` (n, k)."""
         m, c, k = self.linear.mass, self.linear.damping, self.linear.stiffness
-        dynamic = s[:, None, None] ** 2 * m + s[:, None, None] * c + k
+        (share, omega), lost = self.hysteretic, (c + c.T) / 2  # the rest is gyroscopic
+        dynamic = s[:, None, None] ** 2 * m + s[:, None, None] * (c - share * lost) + (k + 1j * share * omega * lost)
         return np.linalg.solve(dynamic, np.broadcast_to(forces, (len(s), *forces.shape)))
 
     def transformed(self, frequency: Array, record: Record) -> ComplexArray:
@@ -184,6 +189,8 @@ def answer(
     state = balanced(
         spindle, condition, {b: _grooves(spindle, b, m, world.grooves_follow_faces) for b, m in motions.items()}, world.constant_kept
     )
+    if world.own_orbits:
+        state = replace(state, bearings=tuple(_on_own_orbit(spindle, b) for b in state.bearings))
     chain = rotor_base(spindle, replace(state, bearings=changed("bearings", state.bearings)))
     chain = changed("chain", distributed(chain, spindle, world.masses))
     if world.weak_mode is not None:
@@ -199,7 +206,8 @@ def answer(
         for node, at in zip(spindle.hammer.hammer_nodes, changed("hammer", hammers), strict=True)
     ]
     responses = [row_of(chain, p.body, *own) for p, *own in zip(spindle.points, *(points_read(spindle) if sensors is None else sensors), strict=True)]
-    return Answer(linear, np.array(responses), np.array(references), gain, delay, changed("decay", 0.0), state.status)
+    lost = world.hysteretic, 2 * np.pi * spindle.structure.damping_frequency
+    return Answer(linear, np.array(responses), np.array(references), gain, delay, changed("decay", 0.0), state.status, lost)
 
 
 def points_struck(spindle: Spindle) -> Array:
@@ -265,6 +273,11 @@ def moved(rows: Sequence[BallRow], external: float) -> float:
         if reach > 5e-4:
             raise ValueError("the bearings find no axial equilibrium within 0.5 mm")
     return float(brentq(left, start - reach, start + reach, xtol=1e-17, rtol=1e-14))
+
+
+def _on_own_orbit(spindle: Spindle, b: BearingState) -> BearingState:
+    more = by_own_orbits(b.row)
+    return replace(b, stiffness=b.stiffness + more, damping=b.damping + spindle.structure.damping_time(spindle.bearing(b.name).damping_ratio) * more)
 
 
 def _otherwise(motion: RingMotion, radial: float, axial: float) -> RingMotion:
