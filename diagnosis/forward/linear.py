@@ -24,7 +24,7 @@ Pairs = Sequence[tuple[Integers, Integers]]
 """Numbers (k,) of a first and of a second vector of k parameters, once or more."""
 
 CHAIN = ("response_rows", "reference_rows", "gain", "delay", "decay")
-BY_LAW = 3  # and on: what stands in place of a power of s, of what another law of damping has otherwise
+BY_LAW = 3  # and on: what stands in place of a power of s, of what a law of damping is about
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
 
 
@@ -87,7 +87,12 @@ def mass_changes(spindle: Spindle, terms: Sequence[MassTerm], dofs: Dofs) -> tup
 class Products:
     """Changes of M, C and K by `count` parameters as sums of few products of two vectors, for an element moves few degrees of freedom: the change of
     the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first; a power from `BY_LAW` on stands for
-    what a law of damping has in its place (`response.Law`)."""
+    what a law of damping has in its place (`response.Law.whole`)."""
+
+    @cached_property
+    def of_dampers(self) -> Products:
+        """With dampers for all that is lost: what a law of damping adds to them is left out, and s stands where it may have something else."""
+        return replace(self, power=np.where(self.power > BY_LAW, 1, self.power), left=np.where(self.power == BY_LAW, 0.0, self.left))
 
     count: int
     of: Integers
@@ -98,8 +103,11 @@ class Products:
 
 
 def products(mass: Array, damping: Array, stiffness: Array, lost: Array | None = None) -> Products:
-    """The products of one parameter's dM, dC, dK (n, n), and of the change of what is `lost` (3, n, n), to `EXACT` of the largest of each."""
+    """The products of one parameter's dM, dC, dK (n, n), and of the change of what is `lost` (3, n, n), which of dC it is then, to `EXACT` of the largest of each."""
     n = len(mass)
+    if lost is not None:
+        rest = damping - lost[1] - lost[2]
+        damping = np.where(np.abs(rest) > EXACT * np.abs(damping).max(), rest, 0.0)
     power: list[int] = []
     left, right = [np.zeros((n, 0))], [np.zeros((n, 0))]
     for exponent, change in ((2, mass), (1, damping), (0, stiffness), *enumerate(() if lost is None else lost, BY_LAW)):

@@ -55,6 +55,10 @@ class Law:
         """What it adds to the dynamic stiffness (3, L) of each of `Linear.lost`: of i H for s C."""
         return np.array([np.full_like(s, 1j * self.factors), -self.factors * s, self.dampers * (1j * self.omega - s)])
 
+    def whole(self, s: ComplexArray) -> ComplexArray:
+        """What the dynamic stiffness (3, L) has of each of these, with what dampers of the same loss have."""
+        return self.over(s) + np.array([np.zeros_like(s), s, s])
+
 
 class Response:
     """FRFs of one test's linear model at its lines, in the measured quantity.
@@ -209,9 +213,10 @@ class Response:
                     np.sum(read[of_it][:, :, None] * driven[of_it][:, None], axis=0, out=found[k])
                 else:  # so many products that their sum, acting on all degrees of freedom, is less work
                     found[k] = self._answering(self._felt(left[:, rows], right[:, rows], by.power[rows]))
-            if (end := self._late) is not None:
-                ended = np.where(by.power < BY_LAW, left, 0.0), right, np.where(by.power < BY_LAW, by.power, 0)  # records end as dampers have it
-                found[by.of] += self._cut * end.moved(np.add.reduceat(end.kicked(*ended), by.first, axis=0))
+            if (end := self._late) is not None:  # records end as dampers have it
+                ended = by.of_dampers
+                kicked = end.kicked(self.over(ended.left), right, ended.power)
+                found[by.of] += self._cut * end.moved(np.add.reduceat(kicked, by.first, axis=0))
         return found
 
     def _answering(self, force: ComplexArray) -> ComplexArray:
@@ -273,9 +278,9 @@ class Response:
     def _forced(self, power: int) -> ComplexArray:
         """The same (r, n_ref, L) of each degree of freedom by itself."""
         if power not in self._by_power:
-            forced = -(self.s**power if power < BY_LAW else self._law.over(self.s)[power - BY_LAW]) * self._driven
-            if (end := self._late) is not None and power < BY_LAW:
-                forced += self._cut * end.tail(np.eye(len(forced)), np.full(len(forced), power))
+            forced = -(self.s**power if power < BY_LAW else self._law.whole(self.s)[power - BY_LAW]) * self._driven
+            if (end := self._late) is not None and power != BY_LAW:
+                forced += self._cut * end.tail(np.eye(len(forced)), np.full(len(forced), 1 if power > BY_LAW else power))
             self._by_power[power] = forced
         return self._by_power[power]
 

@@ -14,6 +14,7 @@ from tests.diagnosis.forward.made import CONDITIONS, KINDS, NOISELESS, SCENES, d
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
 from thermospindle.diagnosis.data.window import Alike, Window
 from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
+from thermospindle.diagnosis.forward.linear import BY_LAW
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.points import otherwise
 from thermospindle.diagnosis.forward.rates import rates_of
@@ -45,6 +46,16 @@ def test_derivatives_of_lines_beside_loss_factors(scene):
     worst = worst_by_kind(model, 1, x)
     assert worst[kinds_of.LAW] < 1e-4
     assert worst[kinds_of.BUILD] < 5e-3
+
+
+def test_what_dampers_lose_otherwise_costs_no_product_more(scene):
+    """A damping that changes has the law in its factor of the line: no product of two vectors stands twice."""
+    model, x = made(scene)
+    rates = rates_of(model, x, [[], []])
+    for number, by in zip(rates.numbers[1], rates.each[1], strict=True):
+        if "damping" in model.parameters[number].name:
+            assert by.power.size
+            assert set(by.power) == {BY_LAW + 2}
 
 
 @pytest.mark.parametrize("lossy", [False, True], ids=["dampers", "loss-factors"])
