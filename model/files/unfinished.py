@@ -22,7 +22,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.files import kept, whole
 from thermospindle.model.parallel import cores, keeping, packed, unpacked
 
-SOON = 60.0
+SOON = 120.0
 """s that work may take before anything of it is kept: so much is done again."""
 MOST_BYTES = 1 << 30
 ROOMS = ("model", "thermal", "sim", "diagnosis", "report")
