@@ -32,6 +32,7 @@ def undrawn(numbers: Numbers, t: int, x: Array, bearings: Sequence[str], joints:
         (numbers.uneven, lambda told: uneven([(joints[p.index], value) for p, value in told])),
         (numbers.balls[t], _otherwise),
         (numbers.apart, lambda told: apart(*({bearings[p.index]: value for p, value in told if p.kind == kind} for kind in kinds_of.APART))),
+        (numbers.heights, lambda told: higher({bearings[p.index]: value for p, value in told})),
     )
 
     def acting(of: Integers, as_effect: Callable[[Told], tuple[Effect, Values]]) -> tuple[Effect, Values]:
@@ -47,7 +48,7 @@ def _otherwise(told: Told) -> tuple[Effect, Values]:
     own = {p.index: value for p, value in told if p.kind == kinds_of.CHANGE and p.test is not None}
     rows = {i - len(CHANGES): value for i, value in own.items() if i >= len(CHANGES)}
     orbits = sum(value for p, value in told if p.kind == kinds_of.ORBITS)
-    return otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0)), rows, orbits)
+    return otherwise(shares, warmer, tuple(own.get(i, 0.0) for i in range(len(CHANGES))), rows, orbits)
 
 
 def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:
@@ -75,15 +76,33 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
     return Effect("apart", "", "", (), "", (), "", pair=pair), {}
 
 
+def higher(by: Mapping[str, float]) -> tuple[Effect, Values]:
+    """Bearings that are higher by so much (m), by name: what resists the motion there, told of where they are drawn, T^T K T."""
+
+    def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
+        there = {name: np.eye(5) for name in by}
+        for name, up in by.items():
+            there[name][0, 4], there[name][1, 3] = up, -up
+        bearings, linear = (
+            tuple(changed(b, stiffness=t.T @ b.stiffness @ t, damping=t.T @ b.damping @ t) for b in own for t in [there[b.name]]) for own in (state.bearings, state.linear)
+        )
+        return changed(state, bearings=bearings, linear=linear)
+
+    return Effect("higher", "", "", (), "", (), "", pair=pair), {}
+
+
 def otherwise(
-    shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float, float] = (0.0, 0.0), rows: Mapping[int, float] = NO_ROWS, orbits: float = 0.0
+    shares: Mapping[int, float], warmer: float = 0.0, own: Sequence[float] = (0.0, 0.0, 0.0, 0.0), rows: Mapping[int, float] = NO_ROWS, orbits: float = 0.0
 ) -> tuple[Effect, Values]:
     """Stiffness and damping of ball rows off by these shares, in each of `DIRECTIONS` by number; in all directions by `warmer` at `RANGE_K` from the reference temperature, in
-    proportion to that; by `own` across the axis, and along it and in tilt; in all directions of `rows` by number; and by a share of what balls would be that had each its own of the `orbits`."""
-    d = np.sqrt(np.maximum(1 + np.array(own), 0.0))[[0, 0, 1, 1, 1]]
+    proportion to that; by `own` as `CHANGES` has it; in all directions of `rows` by number; and by a share of what balls would be that had each its own of the `orbits`."""
+    across, along, in_tilt, between = own
+    d = np.sqrt(np.maximum(1 + np.array([across, across, along, along + in_tilt, along + in_tilt]), 0.0))
     for i, share in shares.items():
         d[list(DIRECTIONS[i][1])] *= np.sqrt(max(1 + share, 0.0))
     square = np.outer(d, d)
+    square[:2, 3:] *= 1 + between
+    square[3:, :2] *= 1 + between
 
     def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
         factor = square * max(1 + warmer * (condition.temperature - spindle.reference_temperature) / RANGE_K, 0.0)
