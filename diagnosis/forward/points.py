@@ -32,7 +32,6 @@ def undrawn(numbers: Numbers, t: int, x: Array, bearings: Sequence[str], joints:
         (numbers.uneven, lambda told: uneven([(joints[p.index], value) for p, value in told])),
         (numbers.balls[t], _otherwise),
         (numbers.apart, lambda told: apart(*({bearings[p.index]: value for p, value in told if p.kind == kind} for kind in kinds_of.APART))),
-        (numbers.heights, lambda told: higher({bearings[p.index]: value for p, value in told})),
     )
 
     def acting(of: Integers, as_effect: Callable[[Told], tuple[Effect, Values]]) -> tuple[Effect, Values]:
@@ -74,21 +73,6 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
         return changed(state, bearings=bearings, linear=linear)
 
     return Effect("apart", "", "", (), "", (), "", pair=pair), {}
-
-
-def higher(by: Mapping[str, float]) -> tuple[Effect, Values]:
-    """Bearings that are higher by so much (m), by name: what resists the motion there, told of where they are drawn, T^T K T."""
-
-    def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
-        there = {name: np.eye(5) for name in by}
-        for name, up in by.items():
-            there[name][0, 4], there[name][1, 3] = up, -up
-        bearings, linear = (
-            tuple(changed(b, stiffness=t.T @ b.stiffness @ t, damping=t.T @ b.damping @ t) for b in own for t in [there[b.name]]) for own in (state.bearings, state.linear)
-        )
-        return changed(state, bearings=bearings, linear=linear)
-
-    return Effect("higher", "", "", (), "", (), "", pair=pair), {}
 
 
 def otherwise(

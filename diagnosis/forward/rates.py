@@ -14,12 +14,12 @@ STEP = 0.02  # of a prior standard deviation, for differences
 
 
 def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
-    """dM, dC, dK by build tolerances, expansion of materials and rings, bearings apart and higher, stiffness and inertia of balls, uneven joints, temperature and how bodies have their mass, for every test; what structure alone moves is kept from `old`."""
+    """dM, dC, dK by build tolerances, expansion of materials and rings, bearings apart, stiffness and inertia of balls, uneven joints, temperature and how bodies have their mass, for every test; what structure alone moves is kept from `old`."""
     numbers, each, dofs, uneven = [], [], [], frozenset(model.numbers.uneven)
     for t, effects in enumerate(effects_of):
         base, speed = model.bare(t, x, effects), model.operating(t, x, effects).chain.speed
         at = base.matrices
-        own = [*range(len(model.build)), *model.numbers.expansion, *model.numbers.coefficients, *model.numbers.apart, *model.numbers.heights, *model.numbers.balls[t], *model.numbers.flung, *model.numbers.uneven, model.numbers.temperature[t]]
+        own = [*range(len(model.build)), *model.numbers.expansion, *model.numbers.coefficients, *model.numbers.apart, *model.numbers.balls[t], *model.numbers.flung, *model.numbers.uneven, model.numbers.temperature[t]]
         kept = old.each[t] if old is not None and old.dofs[t] == at.dofs else ()
         found = []
         for k, i in enumerate(own):

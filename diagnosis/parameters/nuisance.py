@@ -37,8 +37,6 @@ BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "ga
 COEFFICIENT, COEFFICIENT_SD = "coefficient of expansion", 0.01
 """Relative, of each material, the same at all temperatures: what tables give of one alloy differs by a per cent or two."""
 APART = "stiffness apart", "damping apart"  # of bearings
-HEIGHT, HEIGHT_SD = "height of a bearing", 3e-5
-"""How far (m) along the axis the middle of a bearing is from where it is drawn: widths of rings and spacers, and shoulders, are some hundredths of a millimetre off."""
 HAMMER, HAMMER_DRIFT = "gain of a hammer", "drift of a hammer's gain"
 """Of the force at each hammer's point, in all tests and from test to test: its calibration, and the cosine of how askew it hits (5 degrees are 0.4 %)."""
 MISS, MISS_DRIFT, MISS_SD, MISS_DRIFT_SD = "miss of a hammer", "drift of a hammer's miss", 2e-4, 1e-4
@@ -50,8 +48,8 @@ PLACE, PLACE_SD = "place of a sensor", 3e-4
 ASKEW, ASKEW_SD = "direction of a sensor", 0.02
 """By how much (rad) it is turned out of its direction, the same in all tests: a degree of glueing, and a transverse sensitivity of one to three per cent by accelerometers' data sheets (at most 5 %
 is usual), which is the same to an FRF."""
-LATE, LATE_SD = "delay of a channel", 1e-7
-"""How much later (s) it is than the force, the same in all tests: of modules made for it two channels differ by some hundredths of a degree a kHz (0.045 are 0.125 us), and conditioners by as much."""
+LATE, LATE_SD = "delay of a channel", 2e-8
+"""How much later (s) it is than the force, the same in all tests: of modules made for it two channels differ by some thousandths of a degree a kHz, and by 0.045 (0.125 us) at most."""
 BALLS = "stiffness of the balls"
 FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
 """Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
@@ -89,7 +87,7 @@ DAMPING_SD = 0.03  # relative error of a damping ratio at the reference width
 STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at the reference width
 ACTION, OF_CONDITIONS = "action of effects", "action of temperature and speed"
 """No kinds of nuisances, but sizes that are learned: by what share effects, and temperature and speed by themselves, do to a mode other than the model says."""
-UNWRITTEN = (BALLS, *APART, HEIGHT, UNEVEN, MASSES, EXPANSION, COEFFICIENT, FLUNG, ORBITS, CHANGE, STIFFNESS_DRIFT, DAMPING_DRIFT)
+UNWRITTEN = (BALLS, *APART, UNEVEN, MASSES, EXPANSION, COEFFICIENT, FLUNG, ORBITS, CHANGE, STIFFNESS_DRIFT, DAMPING_DRIFT)
 """How a spindle may differ from its drawing without a place in the table `build` of a scene."""
 DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
 SHARE_SD = 0.03  # root of the mass that a mode carries along in a light resonance, over its own modal mass
@@ -106,7 +104,7 @@ learned (`ODDS`)."""
 class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
-    `index` is the number of the toleranced parameter (build), of the bearing (apart, height), the unevenness, the channel (gain and delay: sensors in the order in which tests first have them), the hammer, of a
+    `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain and delay: sensors in the order in which tests first have them), the hammer, of a
     miss twice that and its way, of a sensor's place and direction four times its channel and one of four ways, the material (`Spindle.used_materials`), or unused; `modes` the pair of a discrepancy.
     """
 
@@ -217,7 +215,6 @@ def nuisances(
     for kind, own, sd in zip(APART, ([b.name for b in spindle.rolling], every), (t.structure, t.damping), strict=True):  # given ones have stiffnesses of their own
         if len(own) > 1:
             found += [Nuisance(kind, f"{kind.removesuffix(' apart')} of {b} beside the others", sd, index=every.index(b)) for b in own]
-    found += [Nuisance(HEIGHT, f"height of {b}", HEIGHT_SD, index=i) for i, b in enumerate(every)]
     if spindle.bearings:
         found += [Nuisance(BALLS, f"{name} stiffness of the balls", BALLS_SD, index=i) for i, (name, _) in enumerate(DIRECTIONS)]
     found += changes

@@ -60,7 +60,7 @@ class Numbers:
     @cached_property
     def little(self) -> list[Integers]:
         """For every test the numbers of those by which its bearings and joints differ where rings have settled."""
-        return [np.concatenate([self.apart, self.heights, balls, self.uneven]) for balls in self.balls]
+        return [np.concatenate([self.apart, balls, self.uneven]) for balls in self.balls]
 
     @cached_property
     def expansion(self) -> Integers:
@@ -76,11 +76,6 @@ class Numbers:
     def apart(self) -> Integers:
         """Numbers of the parameters by which bearings differ among themselves."""
         return self._of(*kinds_of.APART)
-
-    @cached_property
-    def heights(self) -> Integers:
-        """Numbers of the parameters by which bearings are higher than drawn."""
-        return self._of(kinds_of.HEIGHT)
 
     @cached_property
     def balls(self) -> list[Integers]:

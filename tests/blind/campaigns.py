@@ -91,7 +91,7 @@ def further(world: World, seed: int, spindle: Spindle) -> World:
         return world
     if seed >= CONVENTIONS_FROM:
         other = np.random.default_rng([seed, 103])
-        world = replace(world, late=float(other.choice([0.0, 3e-8, 1e-7])), own_orbits=bool(other.random() < 0.5), hysteretic=float(other.choice([0.0, 0.5, 1.0])))
+        world = replace(world, late=float(other.choice([0.0, 1e-8, 3e-8])), own_orbits=bool(other.random() < 0.5), hysteretic=float(other.choice([0.0, 0.5, 1.0])))
     if seed >= SENSORS_FROM:
         glued = np.random.default_rng([seed, 97])
         world = replace(world, place=float(glued.choice([1e-4, 4e-4])), askew=float(glued.choice([5e-3, 0.02, 0.03])))

@@ -17,7 +17,7 @@ from thermospindle.sim.campaign.campaign import Noise
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, *kinds_of.APART, kinds_of.HEIGHT, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.FLUNG, kinds_of.ORBITS, kinds_of.LAW, kinds_of.MASSES, kinds_of.TEMPERATURE, kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.PLACE, kinds_of.ASKEW, kinds_of.LATE, kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.RECORD)
+KINDS = (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.FLUNG, kinds_of.ORBITS, kinds_of.LAW, kinds_of.MASSES, kinds_of.TEMPERATURE, kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.PLACE, kinds_of.ASKEW, kinds_of.LATE, kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
