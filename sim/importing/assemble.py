@@ -24,7 +24,7 @@ from thermospindle.sim.importing.modes import rows_of
 from thermospindle.sim.importing.names import plain
 from thermospindle.sim.importing.places import place, points_of, unplaced
 from thermospindle.sim.importing.records.grouped import grouped
-from thermospindle.sim.importing.records.spectra import frfs_of, open_channels
+from thermospindle.sim.importing.records.spectra import of_records, open_channels
 
 SHORT = 1e-4  # s, to which the length that all hits have is told
 
@@ -69,8 +69,7 @@ def read(
         notes.append(f"time records: kept from {measured[0]:g} to {measured[1]:g} Hz, where the hammer test of {scene.name} is; band_Hz under [records] keeps another band")
     lengths: list[float] = []
     uneven: list[str] = []  # tests whose hits are not of one length
-    for (test, label), group in groups.items():
-        made = frfs_of(group, label, form.records, measured)
+    for (test, _), made in of_records(groups, form.records, measured).items():
         notes += made.notes
         questions += made.questions
         curves.setdefault(test, []).extend(made.curves)

@@ -16,8 +16,9 @@ from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.mapping import RecordForm
 from thermospindle.sim.importing.measured import Curve, End, Motion, Question, listed
+from thermospindle.sim.importing.records.grouped import Records
 from thermospindle.sim.importing.records.hits import TOUCHING, Hit, check_numbers, fault, hits_of, limits_of
-from thermospindle.sim.importing.records.windows import contact_time, end_needed, excited, first_heard, shared
+from thermospindle.sim.importing.records.windows import ENDS_AT, contact_time, end_needed, excited, first_heard, shared
 
 SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
 
@@ -34,6 +35,17 @@ class FromRecords:
     questions: tuple[Question, ...]
     pretrigger: float = 0.0
     length: float = 0.0
+
+
+def of_records(groups: Records, form: RecordForm, measured: tuple[float, float] | None = None) -> dict[tuple[str, End], FromRecords]:
+    """The FRFs of every hammer point of every test (`frfs_of`). A test has one window: where one of its points needs it, all have it, whose damping is in all their FRFs then."""
+    found = {(test, reference): frfs_of(files, reference, form, measured) for (test, reference), files in groups.items()}
+    windowed = {test for (test, _), made in found.items() if made.window_decay > 0}
+    as_others = form.model_copy(update={"exponential_end": ENDS_AT})
+    for (test, reference), made in found.items():
+        if test in windowed and made.window_decay == 0 and made.curves:
+            found[test, reference] = frfs_of(groups[test, reference], reference, as_others, measured)
+    return found
 
 
 def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm, measured: tuple[float, float] | None = None) -> FromRecords:

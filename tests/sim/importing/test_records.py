@@ -226,6 +226,27 @@ def test_all_channels_in_one_array(tmp_path, order):
         bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
 
 
+def test_where_one_point_needs_a_window_all_of_a_test_have_it(tmp_path):
+    """Records of a third of a second of a slow mode, which still ring, and of a point that moves with a fast one alone, which do not: the window's damping is in the FRFs of both. They were made without it, and told to have it."""
+    random, n = np.random.default_rng(8), round(0.35 * RATE)
+    force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
+    slow, fast = np.array(answer)[:, :, 0, :n], (np.array(answer)[:, :, 1] - 0.7 * np.array(answer)[:, :, 0])[..., :n]
+    for q, moved in ((1, slow), (2, fast)):
+        np.savez(tmp_path / f"hammer{q}.npz", fs=RATE, force=np.array(force)[:, :n], velocity1=moved[:, 0])
+    columns = 'columns = { force = "force [N]", velocity1 = "velocity 1 [m/s]" }'
+    of_each = "".join(f'[[files]]\nfile = "hammer{q}.npz"\ntest = "T20"\nreference = {q}\n{columns}\n' for q in (1, 2))
+    (tmp_path / "m.toml").write_text(MAPPING.replace('[[files]]\nfile = "hammer*"\ntest = "T20"\n', of_each) + "[records]\nband_Hz = [50.0, 1000.0]\n")
+    notes = bring([tmp_path / "hammer1.npz", tmp_path / "hammer2.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
+    assert sum("exponential window down to 0.01" in note for note in notes) == 2
+    test = read_campaign(tmp_path / "c").tests[0]
+    assert test.window_decay == pytest.approx(-np.log(0.01) / 0.302, rel=1e-2)  # what of a record follows its hit
+    model, unwindowed = (exact(test.frf.frequency, decay)[0] for decay in (test.window_decay, 0.0))
+    of_fast, plain = (of[1] - 0.7 * of[0] for of in (model, unwindowed))
+    assert np.abs(test.frf.value[0, 0] - model[0]).max() < 0.01 * np.abs(model[0]).max()
+    assert np.abs(test.frf.value[0, 1] - of_fast).max() < 0.01 * np.abs(of_fast).max()
+    assert np.abs(test.frf.value[0, 1] - plain).max() > 0.2 * np.abs(of_fast).max()
+
+
 def test_a_window_is_for_what_rings_and_not_for_noise():
     """A response that has died away to the noise of its sensor, 0.05 % of its peak, needs none; one that still rings does, as loud as that noise or three times softer, and so does a dead one with a short tail
     of which nobody can tell."""
