@@ -44,13 +44,15 @@ class Region:
 
 @dataclass(frozen=True)
 class Point:
-    """A measuring point; `direction` is a unit vector along an axis."""
+    """A measuring point; `direction` is a unit vector along an axis. `mass` (kg) is that of a sensor on it that the model is to carry, and `listens` whether there is a sensor at all, and it is not only struck."""
 
     node: int
     name: str
     body: str
     position: tuple[float, float, float]
     direction: tuple[float, float, float]
+    mass: float = 0.0
+    listens: bool = True
 
     @property
     def axis(self) -> str:

@@ -29,6 +29,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import Effect, Measurement, Values
+from thermospindle.sim.effects.structure.sensor_mass import with_sensors
 from thermospindle.thermal.expansion import expand
 
 
@@ -187,7 +188,8 @@ def _region_temperatures(spindle: Spindle, condition: Condition, effects: Sequen
 
 
 def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> Spindle:
-    """The drawing at a condition's temperature, whose shafts and joints have the moduli of it, as effects leave it."""
+    """The drawing at a condition's temperature, with the sensors of known mass on it, whose shafts and joints have the moduli of that temperature, as effects leave it."""
+    spindle = with_sensors(spindle)
     structure = at_temperature(spindle.structure, spindle.materials, spindle.reference_temperature, condition.temperature)
     spindle = spindle if structure is spindle.structure else replace(spindle, structure=structure)
     for effect, values in effects:

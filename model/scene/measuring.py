@@ -24,10 +24,11 @@ class Point(Table):
     body: str
     position_mm: Position
     direction: Annotated[str, AfterValidator(_along_axis)]
+    sensor_mass_g: NotNegative = 0.0
 
     def point(self) -> m.Point:
         x, y, z = (v * MM for v in self.position_mm)
-        return m.Point(node=self.node, name=self.name, body=self.body, position=(x, y, z), direction=axis_vector(self.direction))
+        return m.Point(self.node, self.name, self.body, (x, y, z), axis_vector(self.direction), self.sensor_mass_g * 1e-3)
 
 
 def axis_vector(direction: str) -> tuple[float, float, float]:

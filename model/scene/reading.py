@@ -182,6 +182,11 @@ def content_hash(spindle: Spindle) -> str:
     for segment in (s for shaft in content["structure"]["shafts"] for s in shaft["segments"]):
         if segment["sides"] is None:
             segment.pop("sides")
+    for point in content["points"]:
+        if not point["mass"]:
+            point.pop("mass")
+        if point["listens"]:
+            point.pop("listens")
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]
 
 

@@ -96,7 +96,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
         for name, j in values["joints"].items()
     ]
     points = [
-        [str(p["node"]), name, p["on"], ", ".join(f"{x:g}" for x in p["position_mm"]), p["direction"], "yes" if p["hammer"] else ""]
+        [str(p["node"]), name, p["on"], ", ".join(f"{x:g}" for x in p["position_mm"]), p["direction"], "yes" if p["hammer"] else "", f"{p['sensor_mass_g']:g}" if p["sensor_mass_g"] else ""]
         for name, p in values["points"].items()
     ]
     every = [
@@ -104,7 +104,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
         ("Flexible shafts", ["shaft", "z\nmm", "section\nmm", "mass\nkg", "elements", "beam", "turns"], shafts),
         ("Rigid bodies", ["body", "z\nmm", "mass\nkg", "tilt\nkg m2", "polar\nkg m2", "turns", "moves"], bodies),
         ("Joints", ["joint", "between", "z\nmm", "lateral\nN/m", "axial\nN/m", "tilt\nN m/rad"], joints),
-        ("Points", ["node", "point", "on", "x, y, z\nmm", "along", "hammer"], points),
+        ("Points", ["node", "point", "on", "x, y, z\nmm", "along", "hammer", "sensor\ng"], points),
     ]
     return [g for g in every if g[2]]
 

@@ -82,7 +82,7 @@ def measured_at(spindle: Spindle, points: tuple[Point, ...], test: Test) -> Spin
     nodes = (*responses, *(n for n in references if n not in responses))
     by_node = {p.node: p for p in on_nodes(spindle, points)}
     hammer = replace(spindle.hammer, hammer_nodes=references)
-    return replace(spindle, points=tuple(by_node[n] for n in nodes), hammer=hammer)
+    return replace(spindle, points=tuple(replace(by_node[n], listens=n in responses) for n in nodes), hammer=hammer)
 
 
 def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: Condition) -> Beside | None:

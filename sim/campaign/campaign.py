@@ -223,6 +223,7 @@ def _toml_text(campaign: Campaign) -> str:
             "body": p.body,
             "position_mm": [in_unit(x, MM) for x in p.position],
             "direction": p.axis,
+            **({"sensor_mass_g": in_unit(p.mass, 1e-3)} if p.mass else {}),
         }
         for p in campaign.points
     ]

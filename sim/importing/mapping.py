@@ -85,6 +85,7 @@ class MadePoint(Table):
     body: str | None = None
     position_mm: list[Finite] | None = None
     direction: str | None = None
+    sensor_mass_g: float | None = None
     called: list[str | int] = Field(default_factory=list)
 
 

@@ -82,7 +82,8 @@ def _point(made: MadePoint, base: Point | None) -> Point:
     position = tuple(v * MM for v in made.position_mm) if made.position_mm is not None else (base.position if base else (0.0, 0.0, 0.0))
     direction = axis_vector(made.direction) if made.direction else (base.direction if base else (0.0, 0.0, 1.0))
     name, body = made.name or (base.name if base else ""), made.body or (base.body if base else "")
-    return Point(made.node, name, body, position, direction)  # type: ignore[arg-type]
+    mass = made.sensor_mass_g * 1e-3 if made.sensor_mass_g is not None else (base.mass if base else 0.0)
+    return Point(made.node, name, body, position, direction, mass)  # type: ignore[arg-type]
 
 
 def place(end: End, form: MappingForm, points: dict[int, Point]) -> tuple[int, int] | None:

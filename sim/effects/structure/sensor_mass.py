@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.machine import Condition, Point, Spindle, kept
 from thermospindle.model.structure import Body
 from thermospindle.sim.effects.effect import Effect, Parameter, Values, mass_ratio
 from thermospindle.sim.effects.roles import with_mass
@@ -15,12 +15,26 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     mass = values["mass"] * 1e-3
     if mass == 0.0:
         return spindle
+    share = {turns: values["turning_share" if turns else "standing_share"] * mass for turns in (True, False)}
+    return _carrying(spindle, lambda body, point: share[body.turns] * point.listens, values["unbalanced"])
+
+
+@kept
+def with_sensors(spindle: Spindle) -> Spindle:
+    """The spindle whose bodies carry the sensors that its points tell the mass of, which these do no longer."""
+    if not any(p.mass for p in spindle.points):
+        return spindle
+    heavier = _carrying(spindle, lambda body, point: point.mass, 1.0)
+    return replace(heavier, points=tuple(replace(p, mass=0.0) for p in spindle.points))
+
+
+def _carrying(spindle: Spindle, mass: Callable[[Body, Point], float], unbalanced: float) -> Spindle:
+    """The spindle with a mass (kg) at each of its points, on the body that carries it."""
     bodies = []
     for body in spindle.structure.bodies:
-        here = values["turning_share" if body.turns else "standing_share"] * mass
         for point in spindle.points:
-            if point.body == body.name and here > 0.0:
-                body = loaded(body, point, here, values["unbalanced"])
+            if point.body == body.name and (here := mass(body, point)) > 0.0:
+                body = loaded(body, point, here, unbalanced)
         bodies.append(body)
     return replace(spindle, structure=replace(spindle.structure, bodies=tuple(bodies)))
 

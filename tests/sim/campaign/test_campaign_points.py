@@ -91,6 +91,24 @@ def test_points_stay_where_they_are_on_a_shaft_that_is_divided_otherwise(tmp_pat
         assert other == pytest.approx(first, rel=0.02, abs=0.002 * np.abs(first).max())
 
 
+def test_the_mass_of_a_sensor_goes_with_its_point(spindle, tmp_path):
+    """Through the campaign's file; where none is told there is no such key; and a test's model has it."""
+    campaign = written(spindle)
+    heavy = replace(campaign, points=tuple(replace(p, mass=2.5e-3) if p.node == 6 else p for p in campaign.points))
+    for name, own in (("plain", campaign), ("heavy", heavy)):
+        write_campaign(own, tmp_path / name)
+        assert [p.mass for p in read_campaign(tmp_path / name).points] == pytest.approx([p.mass for p in own.points], rel=1e-12)
+    assert "sensor_mass_g" not in (tmp_path / "plain" / "campaign.toml").read_text()
+    text = (tmp_path / "heavy" / "campaign.toml").read_text()
+    assert text.count("sensor_mass_g = 2.5") == 1
+    at, frequency = Condition(20.0), np.array([800.0, 1200.0, 2000.0])
+    plain, loaded = (beside(spindle, c.points, c.tests[0], at).computed(frequency) for c in (campaign, read_campaign(tmp_path / "heavy")))
+    assert np.abs(loaded - plain).max() > 1e-3 * np.abs(plain).max()
+    (tmp_path / "heavy" / "campaign.toml").write_text(text.replace("sensor_mass_g = 2.5", "sensor_mass_g = -2.5"))
+    with pytest.raises(BadInput, match=r"points\.\d+\.sensor_mass_g = -2\.5: "):
+        read_campaign(tmp_path / "heavy")
+
+
 def test_a_point_beyond_a_shaft_that_was_shortened_is_refused(tmp_path):
     shorter = made(tmp_path, ("[[30, 600]]", "[[30, 580]]"), ("[0.0, 0.0, 600.0]", "[0.0, 0.0, 580.0]"))
     with pytest.raises(BadInput, match=r"points\.4: at z_mm = 600 beyond the shaft 'shaft' of scene \S+, which spans 0 to 580$"):

@@ -11,7 +11,10 @@ from thermospindle.model.rotor.chain import Element, RotorBase, matrices, motion
 from thermospindle.model.rotor.modes import modes, poles
 from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
+from thermospindle.sim.campaign.beside import measured_at
+from thermospindle.sim.campaign.campaign import Test
 from thermospindle.sim.effects.structure import added_disk, hub_flexibility, sensor_mass
+from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
 
 NONE = np.zeros((5, 5))
@@ -144,6 +147,30 @@ def test_sensor_mass_of_one_sensor(spindle):
     found = sensor_mass.loaded(seat, spindle.point(5), 1e-3, 1.0)
     assert found.mass - seat.mass == pytest.approx(1e-3)
     assert np.subtract(found.inertia, seat.inertia) == pytest.approx([0, 4e-7, 4e-7], abs=1e-15)
+
+
+def test_a_sensor_whose_mass_is_told_is_in_the_model(spindle):
+    """Of a point of the seat: the matrices of the effect with a gram at that point alone; the drawing stays what it was, and what is not told weighs nothing."""
+    told = replace(spindle, points=tuple(replace(p, mass=1e-3 if p.node == 5 else 0.0) for p in spindle.points))
+    alone = replace(spindle, points=tuple(replace(p, listens=p.node == 5) for p in spindle.points))
+    expected = at(alone, Condition(40.0), sensor_mass, mass=1.0, turning_share=1.0).chain
+    for condition in (Condition(40.0), Condition(40.0, spindle.nominal_speed)):
+        found = operating_point(told, condition, ())
+        assert found.chain.bodies == expected.bodies
+        assert found.chain.bodies != operating_point(spindle, condition, ()).chain.bodies
+        assert len(found.measurement.response_rows) == len(spindle.points)
+    assert told.structure is spindle.structure
+    both = at(told, Condition(40.0), sensor_mass, mass=2.0, turning_share=1.0).chain
+    assert both.body("seat").mass == pytest.approx(spindle.structure.body("seat").mass + 1e-3 + 2e-3 * sum(p.body == "seat" for p in spindle.points), rel=1e-12)
+
+
+def test_a_point_that_is_only_struck_has_no_sensor(spindle):
+    """A roving hammer: the mass of the sensors is where they are read, and not at every point of the hammer. Eight grams of two accelerometers were 32 on a housing."""
+    frf = Frf(np.array([800.0, 1200.0]), np.ones((1, 3, 2), complex), (5,), (1, 3, 6), "mobility")
+    own = measured_at(spindle, spindle.points, Test("roving", 20.0, 0.0, frf=frf))
+    assert [p.listens for p in own.points] == [True, False, False, False]
+    masses = [at(own, Condition(20.0), sensor_mass, mass=m, turning_share=1.0).chain for m in (0.0, 1.0)]
+    assert sum(b.mass for b in masses[1].bodies) - sum(b.mass for b in masses[0].bodies) == pytest.approx(1e-3, rel=1e-9)
 
 
 def test_balanced_sensors_leave_the_centre_of_mass(spindle):
