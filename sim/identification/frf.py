@@ -145,7 +145,9 @@ FINER = 4  # lines for one of a sweep with uneven steps, where the direction of 
 ENOUGH = 16  # lines, from which their scatter tells noise
 REACTIVE, STEP = 0.3, 0.05  # of its imaginary part a mobility's real part between resonances, and its change from line to line
 HUGE = 1e100  # in any unit; squares of what is larger overflow
-SILENT = 0.02  # of the strongest answer to a hammer; below it symmetry forbids an answer, and noise alone has no coherence
+SILENT, HEARD = 0.02, 0.1
+"""Of the strongest answer to a hammer: below the first symmetry forbids an answer, and noise alone has no coherence; from the second on a sensor that hears the strongest hears it, and in between coherence
+may be as much lower."""
 DRIFT = 1e-3  # of the same, below which what a record holds may be the drift of its sensor, or rounding: neither knows when the blow was
 
 
@@ -166,7 +168,8 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
             _check_axis(key, value)
             _check_gaps(key, frf.frequency, value)
             if frf.coherence is not None:
-                _check_coherence(key, frf.coherence[i, j], np.abs(value), limits if share > SILENT else replace(limits, coherence=0.0))
+                asked = limits.coherence * float(np.clip((share - SILENT) / (HEARD - SILENT), 0.0, 1.0))
+                _check_coherence(key, frf.coherence[i, j], np.abs(value), replace(limits, coherence=asked))
             if frf.sd is not None and not np.all(frf.sd[i, j] > 0):
                 raise BadInput(f"{key}: standard error = {frf.sd[i, j].min():g}: must be positive on every line")
             if share > DRIFT:

@@ -223,6 +223,24 @@ def test_low_coherence_at_antiresonances_is_accepted() -> None:
         check_frf("file", replace(frf, coherence=coherence), 0.0, Limits(coherence=0.995))
 
 
+@pytest.mark.parametrize(("share", "least"), [(0.01, 0.0), (0.03, 0.05), (0.06, 0.35), (0.2, 0.75)])
+def test_what_is_hardly_heard_may_be_less_coherent(share: float, least: float) -> None:
+    """An FRF that symmetry nearly forbids, a fiftieth of the strongest to a tenth: no coherence is asked below, all of it above, and no step lies between. 0.64 was refused and 0.6 taken, of the same two points."""
+    frf = rotor_frf()
+    size = np.linalg.norm(frf.value[:, 0], axis=-1).max()
+    value, coherence = frf.value.copy(), np.full(frf.value.shape, 0.99)
+    value[1, 0] *= share * size / np.linalg.norm(value[1, 0])
+    limits = Limits(reciprocity=np.inf)
+    for own in (least, least + 0.1):
+        coherence[1, 0] = own
+        there = replace(frf, value=value, coherence=coherence.copy())
+        if own > least or least == 0.0:
+            check_frf("file", there, 0.0, limits)
+        else:
+            with pytest.raises(BadInput, match=rf"H\(3,1\): coherence = {own:g} "):
+                check_frf("file", there, 0.0, limits)
+
+
 def test_limits_reach_reading(folder: Path) -> None:
     value = rotor_frf().value
     value[0, 1] *= 1.1
