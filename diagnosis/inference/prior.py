@@ -112,17 +112,19 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
 
     A model whose frequencies are constantly wrong is wrong, too, in what temperature, speed and an effect do: of the relative change of frequency and of damping that
     conditions and each mechanism make of a mode, `moved` (1 + mechanisms, tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the
-    frequencies at least, or what was learned of either.
+    frequencies at least, or what was learned of either. Of a mechanism that is its departure from its mean over the tests: what it does in all of them alike may be misjudged as the drawing is, by a constant error of modes,
+    which every explanation has. Two effects of no use, as much in every test and each other's opposite, had 120 in ln evidence by letting the one mode that both move be off by what they may be.
     """
     least, kinds = ACTION * sizes.get(kinds_of.STIFFNESS, 0.0), (kinds_of.OF_CONDITIONS, *[kinds_of.ACTION] * (len(moved) - 1))
     shares = np.array([max(least, sizes.get(kind, 0.0)) for kind in kinds])
     if not (shares.any() and moved.any()):
         return np.zeros((len(model.parameters), 0))
     found = np.zeros((len(model.parameters), len(moved), *moved.shape[2:]))
+    changes = np.concatenate([moved[:1], moved[1:] - moved[1:].mean(axis=1, keepdims=True)])
     test, _, mode = model.numbers.places
     for which, kind in enumerate(DRIFTING):
         if (own := model.numbers.of_kind.get(kind)) is not None:
-            found[own, :, which, mode[own]] = (shares[:, None] * moved[:, test[own], which, mode[own]]).T / REFERENCE[kind]
+            found[own, :, which, mode[own]] = (shares[:, None] * changes[:, test[own], which, mode[own]]).T / REFERENCE[kind]
     columns = found.reshape(len(found), int(np.prod(found.shape[1:])))
     return columns[:, columns.any(axis=0)]
 
