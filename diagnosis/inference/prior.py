@@ -112,7 +112,7 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
 
     A model whose frequencies are constantly wrong is wrong, too, in what temperature, speed and an effect do: of the relative change of frequency and of damping that
     conditions and each mechanism make of a mode, `moved` (1 + mechanisms, tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the
-    frequencies at least, or what was learned of either. Of a mechanism that is its departure from its mean over the tests: what it does in all of them alike may be misjudged as the drawing is, by a constant error of modes,
+    frequencies at least, or what was learned of either. Of a mechanism that is what it does beyond the least that it does in any test: what it does in all of them alike may be misjudged as the drawing is, by a constant error of modes,
     which every explanation has. Two effects of no use, as much in every test and each other's opposite, had 120 in ln evidence by letting the one mode that both move be off by what they may be.
     """
     least, kinds = ACTION * sizes.get(kinds_of.STIFFNESS, 0.0), (kinds_of.OF_CONDITIONS, *[kinds_of.ACTION] * (len(moved) - 1))
@@ -120,7 +120,8 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
     if not (shares.any() and moved.any()):
         return np.zeros((len(model.parameters), 0))
     found = np.zeros((len(model.parameters), len(moved), *moved.shape[2:]))
-    changes = np.concatenate([moved[:1], moved[1:] - moved[1:].mean(axis=1, keepdims=True)])
+    least = np.take_along_axis(moved[1:], np.abs(moved[1:]).argmin(axis=1, keepdims=True), axis=1)
+    changes = np.concatenate([moved[:1], moved[1:] - least])
     test, _, mode = model.numbers.places
     for which, kind in enumerate(DRIFTING):
         if (own := model.numbers.of_kind.get(kind)) is not None:
