@@ -120,8 +120,8 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
     if not (shares.any() and moved.any()):
         return np.zeros((len(model.parameters), 0))
     found = np.zeros((len(model.parameters), len(moved), *moved.shape[2:]))
-    least = np.take_along_axis(moved[1:], np.abs(moved[1:]).argmin(axis=1, keepdims=True), axis=1)
-    changes = np.concatenate([moved[:1], moved[1:] - least])
+    alike = np.take_along_axis(moved[1:], np.abs(moved[1:]).argmin(axis=1, keepdims=True), axis=1)
+    changes = np.concatenate([moved[:1], moved[1:] - alike])
     test, _, mode = model.numbers.places
     for which, kind in enumerate(DRIFTING):
         if (own := model.numbers.of_kind.get(kind)) is not None:

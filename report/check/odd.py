@@ -39,6 +39,8 @@ LEAST_MODULUS = 0.5e9
 """Pa: plastics have 1 to 4 GPa, and whoever writes 0.21 has it in units of 1000 GPa."""
 LEAST_DENSITY = 100.0
 """kg/m3: foams have more, and whoever writes g/cm3 has 1 to 20."""
+THIN = 0.7
+"""Of the bore of a ring: what of a shaft within it is stiff is no thinner, and told by its radius it has a half."""
 DENSEST = 22600.0
 """kg/m3, of osmium (CRC Handbook of Chemistry and Physics)."""
 OFF = 1.0 * MM
@@ -66,9 +68,10 @@ def _seats(found: Looked) -> Iterator[str]:
         shaft = shafts.get(found.spindle.structure.carrier(b.inner_body))
         if shaft is not None:
             bore, radii = found.spindle.region(b.inner_ring).r[0], _radii(shaft, b.z)[1]
-            seat = max(radii)
-            if min(abs(bore - r) for r in radii) > 0.05 * seat:  # what carries mass may be the ring itself
-                yield f"bearing {b.name}: its inner ring {b.inner_ring!r} begins at a radius of {bore / MM:g} mm, and the shaft {shaft.name!r} has {seat / MM:g} mm there"
+            seat, stiff = max(radii), max(radii[::2])
+            if min(abs(bore - r) for r in radii) > 0.05 * seat or stiff < THIN * bore:  # what carries mass may be the ring itself
+                radius = seat if stiff == seat else stiff
+                yield f"bearing {b.name}: its inner ring {b.inner_ring!r} begins at a radius of {bore / MM:g} mm, and the shaft {shaft.name!r} has {radius / MM:g} mm there" + ("; outer_mm is a diameter" if stiff < THIN * bore else "")
 
 
 def _materials(found: Looked) -> Iterator[str]:

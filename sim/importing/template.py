@@ -154,4 +154,5 @@ def _points(found: Read, scene: Spindle | None) -> Iterable[list[str]]:
             f'body = "?"{bodies}',
             f"position_mm = {toml(where)}    # " + _told(place, unscaled.get(end.node)) + "spindle axis along z, as in the scene",
             f"direction = {toml(end.direction or '?')}    # +X -X +Y -Y +Z -Z: the way the sensor or hammer looks",
+            "# sensor_mass_g = 0.0    # of a sensor that sits there, which the model is to carry",
         ]  # fmt: skip

@@ -38,6 +38,7 @@ ODD = [
     ("hdd_2003", "reference_temperature_C = 20.0", "reference_temperature_C = 295.0", "295 C lies outside -40 to 120 C"),
     ("five_bearing", "nominal_speed_rpm = 8000.0", "nominal_speed_rpm = 40000.0", "means a speed factor n dm of 3.8e+06"),
     ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [90, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 45 mm there"),
+    ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [50, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 25 mm there; outer_mm is a diameter"),
     ("five_bearing", "band_Hz = [300.0, 4000.0]", "band_Hz = [1000.0, 4000.0]", "natural frequencies below the band"),
     ("five_bearing", "record_length_s = 0.25", "record_length_s = 0.02", "has not died out when the record of 0.02 s ends"),
     ("hdd", "nominal_speed_rpm = 7200.0", "nominal_speed_rpm = 60000.0", "bearing_pair.ball_inertia = 0: the balls of lower and upper have no centrifugal force"),
