@@ -117,7 +117,7 @@ def _without_effects(model: CampaignModel) -> Hypothesis:
 
 def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:
     """The model without effects, fitted on from the best explanation that explains more with effects of no size in any test: then it had stalled."""
-    idle = [h for h in ended if none.evidence.learned.errors > STRAIN and h.evidence.ln > none.evidence.ln + OCCAM and all(h.idle)]
+    idle = [h for h in ended if h.evidence.ln > none.evidence.ln + OCCAM and all(h.idle)]
     if not idle:
         return none
     best = max(idle, key=lambda h: h.evidence.ln)
