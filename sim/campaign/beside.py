@@ -74,13 +74,15 @@ def _shaft_of(spindle: Spindle, point: Point) -> Shaft | None:
 
 
 def measured_at(spindle: Spindle, points: tuple[Point, ...], test: Test) -> Spindle:
-    """The spindle with a test's response points first and its hammer points; of a table of modes with the points of its shapes, or as it is where it tells none."""
+    """The spindle with a test's response points first and its hammer points; of a table of modes with the points of its shapes, or as it is where it tells none. A sensor whose mass the campaign does not tell has that of
+    the scene's point of its node."""
     responses = test.response_nodes
     if not responses:
         return spindle
     references = responses[:1] if test.frf is None else test.frf.reference_nodes
     nodes = (*responses, *(n for n in references if n not in responses))
-    by_node = {p.node: p for p in on_nodes(spindle, points)}
+    mass = {p.node: p.mass for p in spindle.points}
+    by_node = {p.node: replace(p, mass=p.mass or mass.get(p.node, 0.0)) for p in on_nodes(spindle, points)}
     hammer = replace(spindle.hammer, hammer_nodes=references)
     return replace(spindle, points=tuple(replace(by_node[n], listens=n in responses) for n in nodes), hammer=hammer)
 

@@ -104,6 +104,8 @@ def test_the_mass_of_a_sensor_goes_with_its_point(spindle, tmp_path):
     at, frequency = Condition(20.0), np.array([800.0, 1200.0, 2000.0])
     plain, loaded = (beside(spindle, c.points, c.tests[0], at).computed(frequency) for c in (campaign, read_campaign(tmp_path / "heavy")))
     assert np.abs(loaded - plain).max() > 1e-3 * np.abs(plain).max()
+    of_scene = replace(spindle, points=heavy.points)
+    assert beside(of_scene, campaign.points, campaign.tests[0], at).computed(frequency) == pytest.approx(loaded, rel=1e-9)  # told there alone
     (tmp_path / "heavy" / "campaign.toml").write_text(text.replace("sensor_mass_g = 2.5", "sensor_mass_g = -2.5"))
     with pytest.raises(BadInput, match=r"points\.\d+\.sensor_mass_g = -2\.5: "):
         read_campaign(tmp_path / "heavy")
