@@ -96,11 +96,13 @@ def likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mappin
 
 def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
     """Steps of a sweep: one size after the other; and what drifts from test to test to nothing where a constant error is of some size, for what is off by the same in all tests
-    could be taken for drift, beside which a constant costs more than it gains."""
+    could be taken for drift, beside which a constant costs more than it gains; and the other way round, for a constant error is one of every two modes too, and drift is each mode's own. A spindle whose one mode is off by
+    a thousandth, in all tests alike, has 38 in ln evidence more by drift, and any effect gained that which came there."""
     found = [{kind: size} for kind, grid in grids.items() for size in grid]
     for constant, drift in ((kinds_of.STIFFNESS, kinds_of.STIFFNESS_DRIFT), (kinds_of.DAMPING, kinds_of.DAMPING_DRIFT)):
         if constant in grids and drift in grids:
             found += [{constant: size, drift: grids[drift][0]} for size in grids[constant]]
+            found += [{constant: grids[constant][0], drift: size} for size in grids[drift]]
     if kinds_of.BUILD in grids:
         as_drawn = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
         found += [{**as_drawn, kinds_of.BUILD: times} for times in grids[kinds_of.BUILD]]
