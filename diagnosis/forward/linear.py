@@ -92,7 +92,7 @@ class Products:
     @cached_property
     def of_dampers(self) -> Products:
         """With dampers for all that is lost: what a law of damping adds to them is left out, and s stands where it may have something else."""
-        return replace(self, power=np.where(self.power > BY_LAW, 1, self.power), left=np.where(self.power == BY_LAW, 0.0, self.left))
+        return replace(self, power=np.select([self.power > BY_LAW, self.power == BY_LAW], [1, 0], self.power), left=np.where(self.power == BY_LAW, 0.0, self.left))
 
     count: int
     of: Integers
