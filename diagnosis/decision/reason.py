@@ -70,9 +70,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             off = [f"{name} by {value:+.0%}" for name, value in unbuilt(found.model, found.base)[:NAMED]]
             place = f"tolerances and measuring errors would, with {listed(off)}, but nothing is built so: the sense of rotation, units, points and the drawing come first"
         elif free and free[0].names != (UNTOLD,):
-            sizes = found.base.evidence.learned.sizes
-            drifts = [(sizes.get(kinds_of.STIFFNESS_DRIFT, 0.0), NUMERICS[0], "frequency"), (sizes.get(kinds_of.DAMPING_DRIFT, 0.0), NUMERICS[1], "damping")]
-            by = " and ".join(f"by {size:.1g} of its {what}" for size, least, what in drifts if size > least)
+            by = " and ".join(f"by {size:.1g} of its {what}" for size, what in drifts(found.model, found.base))
             place = f"every mode drifts from test to test, {by}, more than two honest programs differ by"
         if not free or free[0].names in ((UNTOLD,), (UNBUILT,)):
             return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
@@ -182,6 +180,24 @@ def of_conventions(model: CampaignModel, best: Hypothesis) -> str:
     rows = [(CONVENTIONS[q.kind, max(q.index, 0)], value, sd) for q, value, sd in conventions(model, best)]
     told = [f"{what} ({value:.2f} +- {sd:.1g} of the way from one to the other)" for what, value, sd in rows if value > max(SAME * sd, LITTLE_OF_THE_WAY)]
     return f" Taken into account: {'; '.join(told)}." if told else ""
+
+
+def drifts(model: CampaignModel, h: Hypothesis) -> list[tuple[float, str]]:
+    """By how much of what modes drift from test to test, where that is more than two honest programs differ by. What is off by as much in every test does not drift: a constant error is one of every two modes too, and
+    that of one or two modes alone is had for less as drift of these."""
+    found = []
+    for kind, least, what in ((kinds_of.STIFFNESS_DRIFT, NUMERICS[0], "frequency"), (kinds_of.DAMPING_DRIFT, NUMERICS[1], "damping")):
+        size = h.evidence.learned.sizes.get(kind, 0.0)
+        if size > least and (own := model.numbers.of_kind.get(kind)) is not None:
+            test, _, mode = (place[own] for place in model.numbers.places)
+            value, variance = np.zeros((2, test.max() + 1, mode.max() + 1))
+            value[test, mode] = h.evidence.mean[own] * model.numbers.sd[own]
+            variance[test, mode] = np.diag(h.evidence.covariance)[own] * model.numbers.sd[own] ** 2
+            told = np.sum(np.clip(1 - variance / size**2, 0.0, 1.0)) * (1 - 1 / len(value))  # as many as the data tell
+            size = float(np.sqrt(np.sum((value - value.mean(axis=0)) ** 2) / max(told, 1.0)))
+        if size > least:
+            found.append((size, what))
+    return found
 
 
 def conventions(model: CampaignModel, best: Hypothesis) -> list[tuple[Nuisance, float, float]]:

@@ -20,13 +20,12 @@ from thermospindle.diagnosis.decision.explanations import (
     with_unknown,
 )
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
-from thermospindle.diagnosis.decision.reason import LEFT, MOVING, NUMERICS, UNBUILT, UNTOLD, unbuilt
+from thermospindle.diagnosis.decision.reason import LEFT, MOVING, UNBUILT, UNTOLD, drifts, unbuilt
 from thermospindle.diagnosis.inference.evidence import left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
 from thermospindle.diagnosis.inference.resonance import moving
 from thermospindle.diagnosis.inference.search import Search
-from thermospindle.diagnosis.parameters import nuisance as kinds_of
 
 GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
 MUCH = 0.5  # squares of the errors, from which what is left and changes tells of something else
@@ -97,7 +96,7 @@ def _unheld(
     by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number
     changes = len(found.model.tests) > 1 and alike.tests < ALIKE and kept[0] > max(MUCH, by_chance)
     strange = bool(unbuilt(found.model, found.base))
-    if _adrift(found.base) or gross or changes or strange:
+    if drifts(found.model, found.base) or gross or changes or strange:
         name = UNTOLD if gross else UNBUILT if strange else LEFT if changes else "every mode"
         free = (*free, Candidate(found.base, (name,), True, 0.0, none))
         none = 0.0
@@ -112,12 +111,6 @@ def _unheld(
 def changing(h: Hypothesis, same: Overlap) -> float:
     """Squares of the errors a number that an explanation leaves beyond noise, and not alike in all tests."""
     return h.excess * (1.0 - same.tests)
-
-
-def _adrift(h: Hypothesis) -> bool:
-    """Whether the modes drift from test to test by more than the model's own numerics."""
-    sizes = h.evidence.learned.sizes
-    return sizes.get(kinds_of.STIFFNESS_DRIFT, 0.0) > NUMERICS[0] or sizes.get(kinds_of.DAMPING_DRIFT, 0.0) > NUMERICS[1]
 
 
 def _with_drift_beside(candidates: Sequence[Candidate], free: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
