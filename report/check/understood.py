@@ -88,7 +88,6 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
                 "position_mm": [_mm(x) for x in p.position],
                 "direction": p.axis,
                 "hammer": p.node in spindle.hammer.hammer_nodes,
-                "sensor_mass_g": 1e3 * p.mass,
             }
             for p in spindle.points
         },

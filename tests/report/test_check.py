@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
+from tests.conftest import ROOT
 from tests.report.checked import SCENES, checked, without
 from thermospindle.cli import main
 from thermospindle.model.errors import BadInput
@@ -50,6 +51,23 @@ def test_the_set_of_five_bearings_is_understood(capsys: pytest.CaptureFixture[st
         b = found["bearings"][name]
         reach = b["pitch_diameter_mm"] / 2 * np.tan(np.radians(b["contact_angle_deg"]))
         assert b["load_lines_meet_axis_at_mm"] == pytest.approx(b["z_mm"] + sense * reach, abs=1e-5)
+
+
+def test_the_mass_of_a_sensor_is_told_at_its_point(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """And its body is as much heavier."""
+    text = (ROOT / "scenes" / "hdd_2003" / "spindle.toml").read_text(encoding="utf-8")
+    plain, heavy = tmp_path / "plain.toml", tmp_path / "heavy.toml"
+    plain.write_text(text, encoding="utf-8")
+    heavy.write_text(text.replace('direction = "+X"', 'direction = "+X"\nsensor_mass_g = 1.5', 1), encoding="utf-8")
+    without_one, told = (checked_json(scene, capsys) for scene in (plain, heavy))
+    assert sorted(p["sensor_mass_g"] for p in told["points"].values())[-2:] == [0.0, 1.5]
+    assert {p["sensor_mass_g"] for p in without_one["points"].values()} == {0.0}
+    assert sum(b["mass_kg"] for b in told["bodies"].values()) - sum(b["mass_kg"] for b in without_one["bodies"].values()) == pytest.approx(1.5e-3, rel=1e-6)
+
+
+def checked_json(scene: Path, capsys: pytest.CaptureFixture[str]) -> dict:
+    assert main(["check", str(scene), "--json"]) == 0
+    return dict(json.loads(capsys.readouterr().out))
 
 
 def test_gears_and_rings_that_do_not_grow_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
