@@ -9,13 +9,13 @@ structure      frozen definitions: bodies, and joints between them
 shaft          flexible shafts as they are drawn, and the nodes a beam model gives them
 changed        frozen definitions that are made anew at every operating point, quickly
 carrier        which turning part an unbalance or a radial load acts on
+sensors        bodies with the mass of what sits on measuring points
 span           the temperatures at which a spindle can be computed
 built/         how a built spindle differs from its drawing: toleranced parameters, imperfections
 scene/         `spindle.toml`: its form, reading and checking
 files/         what all files share: written whole, formats and their migrations, cells of CSV files
 bearing/       contact, ball, row, sets; stiffness over temperature and speed; bearing frequencies
 rotor/         the section's masses, the rotor-base chain, modes and FRFs, and the same as a MuJoCo model
-pressure       Hertz pressure of a bearing's most loaded contact, and what ISO 76 allows at rest
 sense          limits of sense of conditions and states: they warn
 units          the units people write and read
 errors         what goes wrong in one sentence

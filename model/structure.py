@@ -27,6 +27,15 @@ class Body:
     speed_ratio: float = 1.0  # of its speed to the spindle's, where it turns
 
 
+def with_mass(body: Body, mass: float, z: float, inertia: tuple[float, float, float]) -> Body:
+    """The body with another one rigidly on it, of centre of mass at height `z` on the axis and its own `inertia` (x, y, z)."""
+    total = body.mass + mass
+    centre = (body.mass * body.z + mass * z) / total
+    steiner = body.mass * (body.z - centre) ** 2 + mass * (z - centre) ** 2
+    about = (body.inertia[0] + inertia[0] + steiner, body.inertia[1] + inertia[1] + steiner, body.inertia[2] + inertia[2])
+    return replace(body, mass=total, z=centre, inertia=about)
+
+
 @dataclass(frozen=True)
 class Joint:
     """A compliant joint between two bodies at height `z`: a diagonal stiffness (N/m, N m/rad) in the order of MOVES."""

@@ -14,22 +14,22 @@ import scipy
 
 from thermospindle.model import sense
 from thermospindle.model.bearing.pair import PairState, solve
+from thermospindle.model.bearing.pressure import pressures
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.files.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.machine import Condition, RingMotion, Spindle
-from thermospindle.model.pressure import pressures
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.beam import at_temperature
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base
 from thermospindle.model.rotor.loaded import loaded
 from thermospindle.model.rotor.modes import Mode, frf, modes, point_rows
 from thermospindle.model.scene.reading import content_hash
+from thermospindle.model.sensors import with_sensors
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import Effect, Measurement, Values
-from thermospindle.sim.effects.structure.sensor_mass import with_sensors
 from thermospindle.thermal.expansion import expand
 
 

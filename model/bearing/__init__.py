@@ -11,6 +11,7 @@ kinematics       how fast cage and balls turn, and at which frequencies a runnin
 pair             the ball rows of all sets against each other: axial equilibrium at a temperature, and the bearing
                  states that follow
 movement         how far rings move until their axial forces balance
+pressure         Hertz pressure of a bearing's most loaded contact, and what ISO 76 allows at rest
 roller           cylindrical roller rows: line contacts in slices, clearance that follows the temperature, stiffness
 row              a ball row where its rings are at a temperature
 springs          balls as springs between points of two bodies: what a ball-by-ball bearing element is made of

@@ -10,10 +10,10 @@ import numpy as np
 from thermospindle.model import sense
 from thermospindle.model.bearing.definitions import ToldAngle
 from thermospindle.model.bearing.pair import joined
+from thermospindle.model.bearing.pressure import OF_BALLS, OF_ROLLERS, pressures
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import Bearing, Condition, LinearBearing
-from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS, pressures
 from thermospindle.model.shaft import SAME_HEIGHT
 from thermospindle.model.units import MM, RPM
 from thermospindle.report.check.looked import Looked

@@ -28,8 +28,8 @@ ONE = 1e-6
 NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 
 
-def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, Any]:
-    """The keys of `spindle check --json` but `odd` and `warnings`; `point` is the spindle at its reference temperature, at rest."""
+def understood(drawn: Spindle, point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, Any]:
+    """The keys of `spindle check --json` but `odd` and `warnings` for a spindle as `drawn`; `point` is it at its reference temperature, at rest, whose bodies carry what sits on points."""
     spindle = point.spindle
     structure, own = spindle.structure, spindle.imperfections
     plain = structure.rigid_bodies
@@ -88,8 +88,9 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
                 "position_mm": [_mm(x) for x in p.position],
                 "direction": p.axis,
                 "hammer": p.node in spindle.hammer.hammer_nodes,
+                "sensor_mass_g": 1e3 * p.mass,
             }
-            for p in spindle.points
+            for p in drawn.points
         },
         "hammer": {
             "nodes": list(spindle.hammer.hammer_nodes),

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.model.bearing.pressure import OF_BALLS, OF_ROLLERS
 from thermospindle.model.bearing.state import ALIKE
 from thermospindle.model.errors import listed
 from thermospindle.model.files.stiffness_table import BETWEEN, FURTHER, PRESSURE, StiffnessTable
-from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS
 from thermospindle.model.rotor.modes import Mode, group_energy, to_real
 from thermospindle.model.rotor.static import Around, Static
 from thermospindle.model.types import Array

@@ -55,9 +55,7 @@ def check(scene: Path, effect_files: Sequence[Path] = (), out: Path | None = Non
 
     spindle, catalogue = with_effects(scene, effect_files)
     point = operating_point(spindle, Condition(spindle.reference_temperature))
-    values: dict[str, Any] = understood(point, catalogue) | {"odd": odd(looked(spindle, point))}
-    for p in spindle.points:  # those of the operating point have handed their sensors to the bodies
-        values["points"][p.name]["sensor_mass_g"] = 1e3 * p.mass
+    values: dict[str, Any] = understood(spindle, point, catalogue) | {"odd": odd(looked(spindle, point))}
 
     def page(folder: Path) -> None:
         from thermospindle.report.check.page import write_check  # matplotlib takes its time to load

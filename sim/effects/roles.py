@@ -67,15 +67,6 @@ def with_stiffness(spindle: Spindle, factor: Mapping[str, float], tilt: Mapping[
     return replace(spindle, structure=replace(spindle.structure, joints=changed))
 
 
-def with_mass(body: Body, mass: float, z: float, inertia: tuple[float, float, float]) -> Body:
-    """The body with another one rigidly on it, of centre of mass at height `z` on the axis and its own `inertia` (x, y, z)."""
-    total = body.mass + mass
-    centre = (body.mass * body.z + mass * z) / total
-    steiner = body.mass * (body.z - centre) ** 2 + mass * (z - centre) ** 2
-    about = (body.inertia[0] + inertia[0] + steiner, body.inertia[1] + inertia[1] + steiner, body.inertia[2] + inertia[2])
-    return replace(body, mass=total, z=centre, inertia=about)
-
-
 def beyond(value: float, play: float) -> float:
     """What is left of a value, of either sign, after a play."""
     return float(np.sign(value) * max(abs(value) - play, 0.0))

@@ -11,8 +11,8 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.hertz import race_contact
+from thermospindle.model.bearing.pressure import of_rollers, pressures
 from thermospindle.model.machine import Condition
-from thermospindle.model.pressure import of_rollers, pressures
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.structure import with_mass
 from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio
-from thermospindle.sim.effects.roles import with_mass
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 
-from thermospindle.model.machine import Condition, Point, Spindle, kept
-from thermospindle.model.structure import Body
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.sensors import carrying
 from thermospindle.sim.effects.effect import Effect, Parameter, Values, mass_ratio
-from thermospindle.sim.effects.roles import with_mass
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
@@ -16,41 +14,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     if mass == 0.0:
         return spindle
     share = {turns: values["turning_share" if turns else "standing_share"] * mass for turns in (True, False)}
-    return _carrying(spindle, lambda body, point: share[body.turns] * point.listens, values["unbalanced"])
-
-
-@kept
-def with_sensors(spindle: Spindle) -> Spindle:
-    """The spindle whose bodies carry the sensors that its points tell the mass of, which these do no longer."""
-    if not any(p.mass for p in spindle.points):
-        return spindle
-    heavier = _carrying(spindle, lambda body, point: point.mass, 1.0)
-    return replace(heavier, points=tuple(replace(p, mass=0.0) for p in spindle.points))
-
-
-def _carrying(spindle: Spindle, mass: Callable[[Body, Point], float], unbalanced: float) -> Spindle:
-    """The spindle with a mass (kg) at each of its points, on the body that carries it."""
-    bodies = []
-    for body in spindle.structure.bodies:
-        for point in spindle.points:
-            if point.body == body.name and (here := mass(body, point)) > 0.0:
-                body = loaded(body, point, here, unbalanced)
-        bodies.append(body)
-    return replace(spindle, structure=replace(spindle.structure, bodies=tuple(bodies)))
-
-
-def loaded(body: Body, point: Point, mass: float, unbalanced: float) -> Body:
-    """The body with a point mass at a measuring point; a turning body has it spread round the axis, its mean over a turn.
-
-    What is not `unbalanced` has a twin at the same distance below the body's centre of mass, half a mass each.
-    """
-    x, y, z = point.position
-    arm = z - body.z
-    square = ((x**2 + y**2) / 2, (x**2 + y**2) / 2) if body.turns else (y**2, x**2)
-    twin = (1 - unbalanced) * mass
-    balanced = with_mass(body, twin, body.z, (twin * (square[0] + arm**2), twin * (square[1] + arm**2), twin * (x**2 + y**2)))
-    own = mass - twin
-    return with_mass(balanced, own, z, (own * square[0], own * square[1], own * (x**2 + y**2)))
+    return carrying(spindle, lambda body, point: share[body.turns] * point.listens, values["unbalanced"])
 
 
 def sized(spindle: Spindle) -> Mapping[str, float]:

@@ -11,9 +11,9 @@ from tests.effect_points import REST, RUNNING, at
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
 from thermospindle.model.rotor.modes import modes, poles
-from thermospindle.model.structure import Body
+from thermospindle.model.structure import Body, with_mass
 from thermospindle.sim.effects.roles import in_series
-from thermospindle.sim.effects.structure import added_disk, shaft_bending, support_anisotropy
+from thermospindle.sim.effects.structure import shaft_bending, support_anisotropy
 from thermospindle.sim.effects.structure.shaft_bending import Piece
 from thermospindle.sim.operating import operating_point
 
@@ -164,7 +164,7 @@ def sliced(spindle, condition, scale, slices=10):
             if b > a:
                 mass = density * np.pi * (g.r[1] ** 2 - g.r[0] ** 2) * (b - a)
                 across = mass / 12 * (3 * (g.r[0] ** 2 + g.r[1] ** 2) + (b - a) ** 2)
-                body = added_disk.with_mass(body, mass, (a + b) / 2, (across, across, mass * (g.r[0] ** 2 + g.r[1] ** 2) / 2))
+                body = with_mass(body, mass, (a + b) / 2, (across, across, mass * (g.r[0] ** 2 + g.r[1] ** 2) / 2))
         bodies.append(body)
     assert sum(b.mass for b in bodies) == pytest.approx(drawn_shaft.mass, rel=1e-9)
     at = {z: bodies[int(np.argmin(np.abs(nodes - z)))].name for z in (1e-3, 5e-3, 16.5e-3)}
