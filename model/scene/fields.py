@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -159,18 +160,29 @@ def read_toml(file: Path) -> dict[str, Any]:
     """The tables of a TOML file; `BadInput` for what is none, or is written so that it cannot be read."""
     if not file.is_file():  # a pipe would be waited for
         raise BadInput(f"{file}: {absent(file)}")
+    text = ""
     try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8-sig"))  # a byte order mark is what some editors begin a file with
+        text = file.read_text(encoding="utf-8-sig")  # a byte order mark is what some editors begin a file with
+        tables = tomllib.loads(text)
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise BadInput(f"{file}: line {line} has a byte that is no UTF-8 ({error.object[error.start]:#04x}), as of another encoding: save the file as UTF-8") from None
     except RecursionError:
         raise BadInput(f"{file}: its tables are nested too deep to be read") from None
     except ValueError as error:  # of TOML, of UTF-8, of numbers with thousands of digits
-        raise BadInput(f"{file}: not a TOML file: {error}") from None
+        raise BadInput(f"{file}: not a TOML file: {error}{_by_comma(text, str(error))}") from None
     if not tables:
         raise BadInput(f"{file}: has no keys: it is empty, or all of it is comment")
     return tables
+
+
+def _by_comma(text: str, error: str) -> str:
+    """What to do about a decimal comma, where one stands at the place that an error of the parser tells; empty where none does."""
+    if (told := re.search(r"at line (\d+), column (\d+)", error)) is None:
+        return ""
+    line, column = (int(number) - 1 for number in told.groups())
+    written = next((w for w in re.finditer(r"[-+]?\d+,\d+", text.split("\n")[line]) if w.start() <= column <= w.end()), None)
+    return f": {written[0]} has a decimal comma; write {written[0].replace(',', '.')}" if written else ""
 
 
 def read_file(kind: str, file: Path) -> dict[str, Any]:

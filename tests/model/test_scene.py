@@ -1,6 +1,7 @@
 """Scene files: what is read, and what is refused in one sentence that names file, key, value and what is allowed."""
 
 import copy
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +29,13 @@ def test_a_file_that_is_not_there_or_not_toml(tmp_path):
     (tmp_path / "spindle.toml").rmdir()
     (tmp_path / "spindle.toml").write_text("title = ", encoding="utf-8")
     with pytest.raises(BadInput, match="not a TOML file"):
+        load(tmp_path)
+    for line, said in (("preload_N = 180,5", "180,5 has a decimal comma; write 180.5"), ("z_mm = [1, -2,5]\nx = -7,25 # mm", "-7,25 has a decimal comma; write -7.25")):
+        (tmp_path / "spindle.toml").write_text(f"title = 'one, two'\n{line}\n", encoding="utf-8")
+        with pytest.raises(BadInput, match=rf"not a TOML file: .* \(at line \d, column \d+\): {re.escape(said)}$"):
+            load(tmp_path)
+    (tmp_path / "spindle.toml").write_text("a = 1,5 = 2\nb = [1,2", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"not a TOML file: "):
         load(tmp_path)
 
 
