@@ -63,14 +63,20 @@ class RecordEnd:
         amplitude = shape[:, None, :] * (self.at_end[:, None] * self.force)[self.seen].T
         return np.asarray(amplitude @ (1 / self.away))
 
-    def kicked(self, left: Array, right: Array, power: Integers) -> ComplexArray:
-        """How the amplitudes (m, k, n_ref) of the seen poles at the records' end change with s^`power` `left` `right`^T (r, m) in the dynamic stiffness."""
+    @cached_property
+    def _swept(self) -> ComplexArray:
+        """How much of what drives a pole comes to each pole seen by the references, (n, k n_ref): divided differences of e^(p T), times `force`."""
         p, e, t = self.poles.value, self.at_end, self.duration
         apart = p[self.seen, None] - p[None, :]
         close = np.abs(apart) * t < CLOSE
         between = np.where(close, t * (e[self.seen, None] + e[None, :]) / 2, (e[self.seen, None] - e[None, :]) / np.where(close, 1.0, apart))
-        shape = right.T @ self.poles.right
-        driven = (shape * p ** power[:, None])[:, :, None] * self.force  # (m, n, n_ref)
-        mass = np.where(power == 2, 1.0, 0.0)[:, None] * ((shape * p) @ self.force)  # a force's first velocity, which the mass sets
-        own = left.T @ self.poles.left[self.seen].T
-        return np.asarray(own[:, :, None] * (between @ driven + e[self.seen, None] * mass[:, None, :]))
+        return np.ascontiguousarray((between.T[:, :, None] * self.force[:, None, :]).reshape(len(p), -1))
+
+    def kicked(self, left: Array, right: Array, power: Integers) -> ComplexArray:
+        """How the amplitudes (m, k, n_ref) of the seen poles at the records' end change with s^`power` `left` `right`^T (r, m) in the dynamic stiffness, of powers up to 2."""
+        p = self.poles.value
+        shape, heavy = right.T @ self.poles.right, power == 2
+        amplitude = ((shape * np.stack([np.ones_like(p), p, p**2])[power]) @ self._swept).reshape(len(shape), len(self.seen), -1)
+        if heavy.any():  # a force's first velocity, which the mass sets
+            amplitude[heavy] += self.at_end[self.seen, None] * ((shape[heavy] * p) @ self.force)[:, None, :]
+        return np.asarray((left.T @ self.poles.left[self.seen].T)[:, :, None] * amplitude)

@@ -67,7 +67,6 @@ def _basis(linear: Matrices, rows: Array, highest: float, beyond: float, small: 
     for _ in range(ORDER - 1):
         last = np.concatenate([highest**2 * flexible * last, highest * flexible * (inner @ last)], axis=1)
         every.append(last)
-    together = np.concatenate(every, axis=1)
-    sizes, directions = np.linalg.eigh(together @ together.T)  # squares, of which rounding leaves 1e-16 of the largest
-    directions = directions[:, sizes > small**2 * sizes[-1]]
+    directions, sizes, _ = np.linalg.svd(np.concatenate(every, axis=1), full_matrices=False)
+    directions = directions[:, sizes > small * sizes[0]]
     return np.asarray(np.concatenate([vectors[:, kept], vectors[:, ~kept] @ directions], axis=1) / root[:, None]), stiffest
