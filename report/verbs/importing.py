@@ -196,8 +196,17 @@ def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None
             frfs = f"{len(t['responses'])} x {len(t['references'])} FRFs of {t['lines']} lines, {t['band_Hz'][0]:g} to {t['band_Hz'][1]:g} Hz" if t["lines"] else ""
             modes = f"{t['modes']} modes" if t["modes"] else ""
             console.print(f"  {t['id']}: {t['temperature_C']:g} C, {t['speed_rpm']:g} rpm: {', '.join(x for x in (frfs, modes) if x)}", highlight=False)
-        for note in notes:
+        for note in _alike(notes):
             console.print(f"  {note}", highlight=False)
         console.print(f"Next: {shlex.join(['spindle', 'compare', str(scene or 'SCENE'), str(out)])}", highlight=False)
 
     return Answer(values, show)
+
+
+def _alike(notes: Sequence[str]) -> list[str]:
+    """Notes that say the same of one file, or test, and of another as one of them all."""
+    whose: dict[str, list[str]] = {}
+    for note in notes:
+        who, _, what = note.partition(": ")
+        whose.setdefault(what or note, []).append(who)
+    return [f"{listed(who, 3)}: {what}" if who != [what] else what for what, who in whose.items()]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from io import StringIO
+
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tests.conftest import SCENE
 from tests.sim.importing.recorded import MAPPING, RATE, exact, hit
@@ -236,8 +239,11 @@ def test_where_one_point_needs_a_window_all_of_a_test_have_it(tmp_path):
     columns = 'columns = { force = "force [N]", velocity1 = "velocity 1 [m/s]" }'
     of_each = "".join(f'[[files]]\nfile = "hammer{q}.npz"\ntest = "T20"\nreference = {q}\n{columns}\n' for q in (1, 2))
     (tmp_path / "m.toml").write_text(MAPPING.replace('[[files]]\nfile = "hammer*"\ntest = "T20"\n', of_each) + "[records]\nband_Hz = [50.0, 1000.0]\n")
-    notes = bring([tmp_path / "hammer1.npz", tmp_path / "hammer2.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
-    assert sum("exponential window down to 0.01" in note for note in notes) == 2
+    answer = bring([tmp_path / "hammer1.npz", tmp_path / "hammer2.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert sum("exponential window down to 0.01" in note for note in answer.values["notes"]) == 2
+    answer.show(console := Console(file=StringIO(), width=300))
+    assert console.file.getvalue().count("exponential window down to 0.01") == 1  # one sentence of both
+    assert "  hammer1.npz, hammer2.npz: 4 of 4 hits" in console.file.getvalue()
     test = read_campaign(tmp_path / "c").tests[0]
     assert test.window_decay == pytest.approx(-np.log(0.01) / 0.302, rel=1e-2)  # what of a record follows its hit
     model, unwindowed = (exact(test.frf.frequency, decay)[0] for decay in (test.window_decay, 0.0))
