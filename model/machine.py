@@ -44,7 +44,8 @@ class Region:
 
 @dataclass(frozen=True)
 class Point:
-    """A measuring point; `direction` is a unit vector along an axis. `mass` (kg) is that of a sensor on it that the model is to carry, and `listens` whether there is a sensor at all, and it is not only struck."""
+    """A measuring point; `direction` is a unit vector along an axis. `mass` (kg) is that of a sensor on it that the model is to carry, and `listens` whether there is a sensor at all, and it is not only struck.
+    `channel` and `hammer` number the sensors and the hammer points of all tests of a campaign, from 1; 0 where its place among those of its spindle does."""
 
     node: int
     name: str
@@ -53,6 +54,8 @@ class Point:
     direction: tuple[float, float, float]
     mass: float = 0.0
     listens: bool = True
+    channel: int = 0
+    hammer: int = 0
 
     @property
     def axis(self) -> str:

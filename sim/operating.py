@@ -22,8 +22,9 @@ from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.beam import at_temperature
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base
+from thermospindle.model.rotor.distributed import spread
 from thermospindle.model.rotor.loaded import loaded
-from thermospindle.model.rotor.modes import Mode, frf, modes, point_rows
+from thermospindle.model.rotor.modes import Between, Mode, frf, modes, point_rows
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.sensors import with_sensors
 from thermospindle.model.types import Array, ComplexArray
@@ -104,15 +105,25 @@ class OperatingPoint:
         """Oscillating modes below `highest` (Hz); of a flexible shaft quicker than all `modes`."""
         return modes(self.chain, self.linear, highest) if "modes" not in self.__dict__ else [m for m in self.modes if m.frequency < highest]
 
-    def frf(self, frequency: Array, window_decay: float = 0.0) -> ComplexArray:
+    def frf(self, frequency: Array, window_decay: float = 0.0, between: Between | None = None) -> ComplexArray:
         """Exact mobility (n_resp, n_ref, n) of the linear model at `frequency` (Hz), as the measuring chain shows it.
 
-        `window_decay` (1/s) is that of an exponential window that is known and still in the FRFs.
+        `window_decay` (1/s) is that of an exponential window that is known and still in the FRFs; with the mass `between` nodes of shafts (`mass_between`) where it is, as MuJoCo does not step it.
         """
         m = self.measurement
         s: ComplexArray = np.asarray(frequency - 1j * (m.decay + window_decay) / (2 * np.pi), complex)
-        value = frf(self.linear, m.response_rows, m.reference_rows, s, "mobility")
+        value = frf(self.linear, m.response_rows, m.reference_rows, s, "mobility", between)
         return value * (m.gain[:, None] * np.exp(-2j * np.pi * frequency * m.delay[:, None]))[:, None, :]
+
+
+def mass_between(point: OperatingPoint, drawing: Spindle) -> Between | None:
+    """What the mass between the nodes of shafts adds at an operating point, with the drawing's materials at the reference temperature: what an effect changes of so
+    little is left out."""
+    structure = point.spindle.structure
+    if not structure.shafts:
+        return None
+    mass, quartic, gyroscopic = spread(structure, drawing.materials, drawing.reference_temperature, point.chain.layout)
+    return mass, quartic, point.chain.speed * gyroscopic
 
 
 def operating_point(

@@ -182,13 +182,13 @@ def _shape_nodes(o: Observation) -> tuple[int, ...]:
 
 def _as_measured(spindle: Spindle, campaign: Campaign, o: Observation) -> Predicted:
     """Modes predicted for a test, with shapes at its response points."""
-    found = predict(measured_at(spindle, campaign.points, o.test), o, of_scene(spindle), lumped=campaign.lumped_shafts)
+    found = predict(measured_at(spindle, campaign, o.test), o, of_scene(spindle), lumped=campaign.lumped_shafts)
     return found if o.shape is None else replace(found, shape=found.shape[:, : o.shape.shape[1]])
 
 
 def _at_its_temperature(spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Integers) -> Observation:
     """The observation with the error of its temperature among its errors."""
-    here = measured_at(spindle, campaign.points, o.test)
+    here = measured_at(spindle, campaign, o.test)
     slope = temperature_slope(here, o, p, of_scene(spindle), campaign.lumped_shafts).reshape(2, -1)
     return with_temperature(o, np.where(partner >= 0, slope[:, partner], 0.0).ravel(), spindle.tolerances.temperature)
 
@@ -276,7 +276,7 @@ def _test(
     frf = o.test.frf
     low, high = spindle.hammer.band if frf is None else (frf.frequency[0], frf.frequency[-1])
     found = set(partner.tolist())
-    own = beside(spindle, campaign.points, o.test, o.condition) if frfs else None
+    own = beside(spindle, campaign, o.test, o.condition) if frfs else None
     correlation = None if own is None else correlate(own)
     return TestComparison(
         o.test,

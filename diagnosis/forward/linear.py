@@ -12,12 +12,10 @@ import numpy as np
 from thermospindle.diagnosis.parameters.masses import MassTerm
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.distributed import spread
 from thermospindle.model.rotor.modes import Between
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import Measurement
-from thermospindle.sim.operating import OperatingPoint
 
 Dofs = tuple[tuple[str, str], ...]
 Pairs = Sequence[tuple[Integers, Integers]]
@@ -56,16 +54,6 @@ class Linear:
 def shown(chain: Measurement, pole: ComplexArray, right: ComplexArray) -> ComplexArray:
     """Shapes (k, n_resp) of modes with poles (k,) as they are seen and right vectors (n, k), with the gains and delays of their channels."""
     return (chain.response_rows @ right).T * (chain.gain * np.exp(-1j * np.abs(pole[:, None]) * chain.delay))
-
-
-def mass_between(point: OperatingPoint, drawing: Spindle) -> Between | None:
-    """What the mass between the nodes of shafts adds at an operating point, with the drawing's materials at the reference temperature: what an effect changes of so
-    little is left out."""
-    structure = point.spindle.structure
-    if not structure.shafts:
-        return None
-    mass, quartic, gyroscopic = spread(structure, drawing.materials, drawing.reference_temperature, point.chain.layout)
-    return mass, quartic, point.chain.speed * gyroscopic
 
 
 def mass_changes(spindle: Spindle, terms: Sequence[MassTerm], dofs: Dofs) -> tuple[Array, Array]:

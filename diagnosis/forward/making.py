@@ -29,7 +29,7 @@ IN_BAND, BEYOND = 1.15, 2.2  # of the highest line: modes that are seen, and mod
 
 def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestData]) -> CampaignModel:
     """The model of a campaign whose tests are `tests`."""
-    scenes = tuple(measured_at(spindle, campaign.points, d.test) for d in tests)
+    scenes = tuple(measured_at(spindle, campaign, d.test) for d in tests)
     present = tuple(of_scene(spindle))
     reference = matrices(operating_point(spindle, Condition(spindle.reference_temperature), present).chain)
     highest = max(float(d.frequency.max()) for d in tests)

@@ -14,7 +14,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward.latest import Latest
-from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_between, mass_changes
+from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_changes
 from thermospindle.diagnosis.forward.measuring import channel_gain, measured, replace_measuring
 from thermospindle.diagnosis.forward.points import Applied, undrawn
 from thermospindle.diagnosis.forward.response import Law, Light, Response
@@ -33,7 +33,7 @@ from thermospindle.model.rotor.modes import Between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, with_material
-from thermospindle.sim.operating import SETTLING, OperatingPoint, acted_on, equilibrium, operating_point
+from thermospindle.sim.operating import SETTLING, OperatingPoint, acted_on, equilibrium, mass_between, operating_point
 
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least

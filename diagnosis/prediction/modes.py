@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.observe import Observation
-from thermospindle.diagnosis.forward.linear import Linear, mass_between, shown
+from thermospindle.diagnosis.forward.linear import Linear, shown
 from thermospindle.diagnosis.forward.model import Applied
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import kinds, oscillating, stiffest_of, with_mass_between
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.identification.pairing import ModeSet
-from thermospindle.sim.operating import operating_point
+from thermospindle.sim.operating import mass_between, operating_point
 
 BEYOND = 1.5  # of the hammer's band, up to which modes are computed
 

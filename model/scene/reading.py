@@ -183,8 +183,9 @@ def content_hash(spindle: Spindle) -> str:
         if segment["sides"] is None:
             segment.pop("sides")
     for point in content["points"]:
-        if not point["mass"]:
-            point.pop("mass")
+        for key in ("mass", "channel", "hammer"):
+            if not point[key]:
+                point.pop(key)
         if point["listens"]:
             point.pop("listens")
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]

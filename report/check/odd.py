@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.linear import mass_between
 from thermospindle.model.carrier import UNBALANCE, load_carrier, turning_parts, unbalanced
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import PARTS, Point, Spindle
@@ -21,6 +20,7 @@ from thermospindle.report.check.odd_bearings import OF_BEARINGS
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
+from thermospindle.sim.operating import mass_between
 from thermospindle.sim.resonance.critical import criticals
 
 WEAK = 0.1

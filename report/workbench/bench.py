@@ -179,7 +179,7 @@ def built(bench: Bench, s: Setting) -> Spindle:
 
 def _point(bench: Bench, spindle: Spindle, shown: Shown) -> OperatingPoint:
     if bench.campaign is not None and shown.test is not None:
-        found = beside(spindle, bench.campaign.points, shown.test, shown.condition)
+        found = beside(spindle, bench.campaign, shown.test, shown.condition)
         if found is not None:
             return found.point
     return operating_point(spindle, shown.condition)
@@ -204,7 +204,7 @@ def curves(bench: Bench, s: Setting, shown: Shown, response: int, hammer: int) -
     """The FRF between a response and a hammer node of a test."""
     spindle = built(bench, s)
     peaks = next((o.frequency for o in bench.observations if o.test.id == shown.id), np.zeros(0))
-    found = beside(spindle, bench.campaign.points, shown.test, shown.condition) if bench.campaign and shown.test else None
+    found = beside(spindle, bench.campaign, shown.test, shown.condition) if bench.campaign and shown.test else None
     if found is None:  # nothing was measured, or a table of modes
         lines = np.linspace(*spindle.hammer.band, LINES)
         value = operating_point(spindle, shown.condition).frf(lines)

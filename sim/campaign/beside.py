@@ -11,21 +11,24 @@ import numpy as np
 from thermospindle.model import sense
 from thermospindle.model.errors import BadInput, listed
 from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.rotor.modes import Between
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import MM
 from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 from thermospindle.sim.identification.frf import POWER, Frf, out_of, without
-from thermospindle.sim.operating import OperatingPoint, operating_point
+from thermospindle.sim.operating import OperatingPoint, mass_between, operating_point
 
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """One test: `measured` FRFs at the lines above 0 Hz without those of the running speed, and `point`, the model at the test's condition with the test's points."""
+    """One test: `measured` FRFs at the lines above 0 Hz without those of the running speed, `point`, the model at the test's condition with the test's points, and what the mass `between` nodes of its shafts adds, which a
+    campaign of this program's own has not."""
 
     test: Test
     measured: Frf
     point: OperatingPoint
+    between: Between | None = None
 
     def computed(self, frequency: Array) -> ComplexArray:
         """The model's FRFs (responses, references, n) at any `frequency` (n,) Hz, in the measured quantity.
@@ -33,7 +36,7 @@ class Beside:
         An exponential window exp(-decay t) left in the measured ones damps these as much: they are taken at i omega + decay.
         """
         s = 2j * np.pi * frequency + self.test.window_decay
-        value = self.point.frf(frequency, self.test.window_decay) * s ** POWER[self.measured.quantity]
+        value = self.point.frf(frequency, self.test.window_decay, self.between) * s ** POWER[self.measured.quantity]
         return np.asarray(value[: len(self.measured.response_nodes)], complex)
 
     @property
@@ -73,26 +76,32 @@ def _shaft_of(spindle: Spindle, point: Point) -> Shaft | None:
     return next((s for s in spindle.structure.shafts if s.name == point.body or (s.name == name and number.isdecimal())), None)
 
 
-def measured_at(spindle: Spindle, points: tuple[Point, ...], test: Test) -> Spindle:
-    """The spindle with a test's response points first and its hammer points; of a table of modes with the points of its shapes, or as it is where it tells none. A sensor whose mass the campaign does not tell has that of
-    the scene's point of its node."""
+def measured_at(spindle: Spindle, campaign: Campaign, test: Test) -> Spindle:
+    """The spindle with the response points of a campaign's test first and its hammer points; of a table of modes with the points of its shapes, or as it is where it tells none. A sensor whose mass the campaign does not
+    tell has that of the scene's point of its node."""
     responses = test.response_nodes
     if not responses:
         return spindle
     references = responses[:1] if test.frf is None else test.frf.reference_nodes
     nodes = (*responses, *(n for n in references if n not in responses))
     mass = {p.node: p.mass for p in spindle.points}
-    by_node = {p.node: replace(p, mass=p.mass or mass.get(p.node, 0.0)) for p in on_nodes(spindle, points)}
+    channel, struck = ({n: k for k, n in enumerate(of_all, 1)} for of_all in (campaign.sensors, campaign.hammers))
+    by_node = {
+        p.node: replace(p, mass=p.mass or mass.get(p.node, 0.0), listens=p.node in responses, channel=channel.get(p.node, 0), hammer=struck.get(p.node, 0))
+        for p in on_nodes(spindle, campaign.points)
+    }
     hammer = replace(spindle.hammer, hammer_nodes=references)
-    return replace(spindle, points=tuple(replace(by_node[n], listens=n in responses) for n in nodes), hammer=hammer)
+    return replace(spindle, points=tuple(by_node[n] for n in nodes), hammer=hammer)
 
 
-def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: Condition) -> Beside | None:
-    """A test of a campaign with these points, and the scene at its condition; None for a table of modes."""
+def beside(spindle: Spindle, campaign: Campaign, test: Test, condition: Condition) -> Beside | None:
+    """A test of a campaign, and the scene at its condition; None for a table of modes."""
     if test.frf is None:
         return None
     measured = without(test.frf, out_of(test.frf, test.speed).out | (test.frf.frequency <= 0))
-    return Beside(test, measured, operating_point(measured_at(spindle, points, test), condition))
+    own = measured_at(spindle, campaign, test)
+    point = operating_point(own, condition)
+    return Beside(test, measured, point, None if campaign.lumped_shafts else mass_between(point, own))
 
 
 def doubtful(spindle: Spindle, campaign: Campaign) -> list[str]:

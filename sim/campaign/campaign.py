@@ -84,6 +84,16 @@ class Campaign:
     folder: Path | None = field(default=None, compare=False)
 
     @property
+    def sensors(self) -> tuple[int, ...]:
+        """Nodes of the responses of all tests, in the order in which tests first have them."""
+        return tuple(dict.fromkeys(n for t in self.tests for n in t.response_nodes))
+
+    @property
+    def hammers(self) -> tuple[int, ...]:
+        """Nodes of the hammer points of all tests, likewise."""
+        return tuple(dict.fromkeys(n for t in self.tests if t.frf is not None for n in t.frf.reference_nodes))
+
+    @property
     def name(self) -> str:
         """What its folder is called, or its title without one."""
         return self.folder.resolve().name if self.folder else self.title

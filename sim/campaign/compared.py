@@ -38,7 +38,7 @@ class Compared:
 
 def compared(spindle: Spindle, campaign: Campaign, test: Test, scale: float = 1.0) -> Compared | None:
     """A test at some of its lines, taken `scale` times as high as they are told; None of a table of modes, or where nothing holds the model, or it has no answer."""
-    own = beside(spindle, campaign.points, test, condition_of(test))
+    own = beside(spindle, campaign, test, condition_of(test))
     if own is None or not own.held or not len(own.measured.frequency):
         return None
     step = -(-len(own.measured.frequency) // MOST_LINES)

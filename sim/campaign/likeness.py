@@ -133,7 +133,7 @@ def _turned(spindle: Spindle, campaign: Campaign) -> str | None:
     for t in campaign.tests:
         if not t.speed or t.frf is None:
             continue
-        told, other = (beside(spindle, campaign.points, t, replace(condition_of(t), speed=sign * t.speed)) for sign in (1, -1))
+        told, other = (beside(spindle, campaign, t, replace(condition_of(t), speed=sign * t.speed)) for sign in (1, -1))
         if told is None or other is None or not told.held or not len(told.measured.frequency):
             continue
         step = -(-len(told.measured.frequency) // MOST_LINES)

@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.machine import Condition, RingMotion, Spindle
@@ -162,6 +164,16 @@ def channel_parameter(meaning: str) -> Parameter:
     """Which response channel is meant, counted from 1; 0 for the ordinary case of many."""
     source = "a whole group of channels is assumed; one alone where a sensor or its amplifier is set wrongly"
     return Parameter("channel", "1", 0.0, 0.0, 1.0, (0.0, 16.0), meaning, source, choices=tuple(float(c) for c in range(17)))
+
+
+def channel_numbers(spindle: Spindle) -> Array:
+    """Numbers (n_points,) of the points as response channels, from 1: of a campaign's test those that its sensors have in all tests."""
+    return np.array([p.channel or k for k, p in enumerate(spindle.points, 1)])
+
+
+def hammer_numbers(spindle: Spindle) -> Array:
+    """Numbers (n_ref,) of the hammer's points, likewise."""
+    return np.array([spindle.point(n).hammer or k for k, n in enumerate(spindle.hammer.hammer_nodes, 1)])
 
 
 def phase_parameter(meaning: str) -> Parameter:

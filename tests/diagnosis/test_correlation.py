@@ -20,7 +20,7 @@ from thermospindle.diagnosis.compare.correlation import (
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.beside import Beside, beside
-from thermospindle.sim.campaign.campaign import Test
+from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
 
@@ -116,7 +116,7 @@ class Rigid:
     def state(self):
         return self.of.state
 
-    def frf(self, frequency, window_decay=0.0):
+    def frf(self, frequency, window_decay=0.0, between=None):
         return np.ones((7, 2, 1)) / (2j * np.pi * frequency)
 
 
@@ -164,9 +164,11 @@ def test_closed_forms():
 def test_lines_at_zero_and_few_lines(spindle, point):
     frequency = np.array([0.0, 500.0, 501.0])
     frf = Frf(frequency, np.ones((7, 2, 3), complex), tuple(p.node for p in spindle.points), (1, 2), "receptance")
-    shown = beside(spindle, spindle.points, Test("t", 40.0, 0.0, frf=frf), Condition(40.0))
+    tests = Test("t", 40.0, 0.0, frf=frf), Test("table", 40.0, 0.0)
+    campaign = Campaign("two", spindle.name, "receptance", spindle.points, tests)
+    shown = beside(spindle, campaign, tests[0], Condition(40.0))
     assert shown.measured.frequency.tolist() == [500.0, 501.0]
     found = correlate(shown)
     assert found.bands == ()
     assert found.whole.shift is None
-    assert beside(spindle, spindle.points, Test("t", 40.0, 0.0), Condition(40.0)) is None
+    assert beside(spindle, campaign, tests[1], Condition(40.0)) is None

@@ -12,7 +12,6 @@ import pytest
 
 from tests.conftest import ROOT
 from thermospindle.cli import main
-from thermospindle.diagnosis.forward.linear import mass_between
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.beam import with_theory
 from thermospindle.model.rotor.chain import matrices, motion_rows
@@ -20,7 +19,7 @@ from thermospindle.model.rotor.modes import poles_below
 from thermospindle.model.rotor.static import rated_chain
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
-from thermospindle.sim.operating import operating_point
+from thermospindle.sim.operating import mass_between, operating_point
 
 SCENE = ROOT / "scenes" / "mk7702"
 

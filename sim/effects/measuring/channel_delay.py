@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase
-from thermospindle.sim.effects.effect import Effect, Measurement, Parameter, Values, channel_parameter
+from thermospindle.sim.effects.effect import Effect, Measurement, Parameter, Values, channel_numbers, channel_parameter
 
 
 def measurement(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase, measurement: Measurement) -> Measurement:
     first = values["delay"] * 1e-6
     if first == 0.0:
         return measurement
-    count = np.arange(len(measurement.delay))
-    only = values["channel"]
-    later = first * (count + 1 == only) if only else first * (1 + values["skew"] * count)
+    number, only = channel_numbers(spindle), values["channel"]
+    later = first * (number == only) if only else first * (1 + values["skew"] * (number - 1))
     return replace(measurement, delay=measurement.delay + later)
 
 
@@ -46,7 +43,7 @@ EFFECT = Effect(
             meaning="further delay from one channel to the next over the first's: a multiplexer",
             source="assumed: multiplexed converters take 1 to 10 us a channel; simultaneous ones have none",
         ),
-        channel_parameter("which channel is late: 0 all of them, 1 the first in the order of the points, and so on"),
+        channel_parameter("which channel is late: 0 all of them, 1 the first in the order of the points, or in which a campaign's tests have them, and so on"),
     ),
     sees=(
         "phase falls in proportion to frequency: driving-point FRFs lose their positive real part, one-mode circles turn; "

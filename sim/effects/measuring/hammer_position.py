@@ -8,7 +8,7 @@ import numpy as np
 
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.rotor.chain import RotorBase, point_row
-from thermospindle.sim.effects.effect import Effect, Measurement, Parameter, Values, direction_parameter
+from thermospindle.sim.effects.effect import Effect, Measurement, Parameter, Values, direction_parameter, hammer_numbers
 
 
 def measurement(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase, measurement: Measurement) -> Measurement:
@@ -19,7 +19,7 @@ def measurement(spindle: Spindle, condition: Condition, values: Values, chain: R
     aimed = [spindle.point(node) for node in spindle.hammer.hammer_nodes]
     missed = np.array([point_row(chain, off(p, offset, direction)) - point_row(chain, p) for p in aimed])
     if values["node"]:
-        missed[np.arange(len(aimed)) + 1 != values["node"]] = 0.0
+        missed[hammer_numbers(spindle) != values["node"]] = 0.0
     return replace(measurement, reference_rows=measurement.reference_rows + missed)
 
 
@@ -65,7 +65,7 @@ EFFECT = Effect(
             typical=0.0,
             prior_sd=1.0,
             limits=(0.0, 4.0),
-            meaning="which hammer node is missed: 0 all of them, 1 the scene's first, and so on",
+            meaning="which hammer node is missed: 0 all of them, 1 the scene's first, or the first that a campaign's tests have, and so on",
             source="assumed: whoever hits beside one hits beside all",
             choices=(0.0, 1.0, 2.0, 3.0, 4.0),
         ),

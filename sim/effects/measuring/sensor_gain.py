@@ -8,7 +8,7 @@ import numpy as np
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase
-from thermospindle.sim.effects.effect import Effect, Measurement, Parameter, Values, channel_parameter
+from thermospindle.sim.effects.effect import Effect, Measurement, Parameter, Values, channel_numbers, channel_parameter
 
 
 def measurement(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase, measurement: Measurement) -> Measurement:
@@ -16,7 +16,7 @@ def measurement(spindle: Spindle, condition: Condition, values: Values, chain: R
     if gain == 0.0 and rest == 0.0:
         return measurement
     if channel:
-        meant = np.arange(len(spindle.points)) + 1 == channel
+        meant = channel_numbers(spindle) == channel
     else:
         turning = np.array([spindle.structure.body(p.body).turns for p in spindle.points])
         meant = turning if turning.any() else np.ones(len(turning), bool)
@@ -48,7 +48,7 @@ EFFECT = Effect(
             meaning="relative gain error of all other channels",
             source="calibration of the other sensor type, same size",
         ),
-        channel_parameter("which channel reads gain: 0 all on the turning part (all, where none is there), 1 the first in the order of the points, and so on"),
+        channel_parameter("which channel reads gain: 0 all on the turning part (all, where none is there), 1 the first in the order of the points, or in which a campaign's tests have them, and so on"),
     ),
     sees=(
         "shapes of all modes show too much or too little at one group of points, by the same factor in every test; frequencies and "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,17 +12,19 @@ import pytest
 from tests.conftest import ROOT
 from tests.virtual_campaign import model_of, virtual_campaign
 from thermospindle.diagnosis.compare.compare import compare
-from thermospindle.diagnosis.forward.linear import mass_between
 from thermospindle.diagnosis.forward.making import BEYOND, IN_BAND, MOST_MODES
 from thermospindle.diagnosis.parameters.reference import reference_modes
+from thermospindle.diagnosis.prediction.modes import predict
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import kinds, oscillating, poles_below, with_mass_between
 from thermospindle.model.scene.reading import build, load
 from thermospindle.model.units import RPM
-from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.campaign.beside import beside
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition_of
 from thermospindle.sim.campaign.modes import ModeRow
-from thermospindle.sim.operating import operating_point
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.operating import mass_between, operating_point
 
 NOISELESS = Noise(0.0, 0.0)
 
@@ -85,3 +88,23 @@ def test_a_table_of_modes_has_the_mass_of_shafts_where_it_is():
     assert len(compared[False]) == len(pole)
     assert max(compared[False]) < 3e-5
     assert max(compared[True]) > 1e-3
+
+
+@pytest.mark.parametrize(("name", "rpm"), [("free_shaft", 0.0), ("mk7702", 0.0), ("five_bearing", 8000.0)])
+def test_frfs_and_modes_of_one_comparison_are_of_one_model(name, rpm):
+    """FRFs that are set beside measured ones are those of the whole dynamic stiffness K + s C + s^2 M - s^4 N, line by line, of which the mode table has the poles. They had masses at nodes."""
+    spindle = load(ROOT / "scenes" / name)
+    nodes, (low, high) = tuple(p.node for p in spindle.points), spindle.hammer.band
+    lines = np.linspace(low, high, 60)
+    test = Test("t", spindle.reference_temperature, rpm * RPM, frf=Frf(lines, np.ones((len(nodes), 1, len(lines)), complex), nodes, nodes[:1], "receptance"))
+    campaign = Campaign("one", spindle.name, "receptance", spindle.points, (test,))
+    shown, at_nodes = (beside(spindle, replace(campaign, lumped_shafts=lumped), test, condition_of(test)) for lumped in (False, True))
+    linear, (mass, quartic, damping), rows = shown.point.linear, mass_between(shown.point, spindle), shown.point.measurement.response_rows
+    s = 2j * np.pi * lines[:, None, None]
+    whole = s**2 * (linear.mass + mass) + s * (linear.damping + damping) + linear.stiffness - s**4 * quartic
+    expected = np.moveaxis(rows @ np.linalg.solve(whole, rows[:1].T), 0, -1)
+    scale = np.abs(expected).max(axis=(0, 1))
+    assert (np.abs(shown.computed(lines) - expected).max(axis=(0, 1)) / scale).max() < 5e-4
+    assert (np.abs(at_nodes.computed(lines) - expected).max(axis=(0, 1)) / scale).max() > (5e-3 if name != "free_shaft" else 1e-4)
+    poles, _ = poles_below(linear, high, (mass, quartic, damping))
+    assert poles == pytest.approx(predict(shown.point.spindle, SimpleNamespace(condition=condition_of(test)), ()).pole[: len(poles)], rel=2e-5)

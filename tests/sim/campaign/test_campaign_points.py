@@ -86,7 +86,7 @@ def test_points_stay_where_they_are_on_a_shaft_that_is_divided_otherwise(tmp_pat
     by_name = [replace(p, body=p.body.split()[0]) for p in campaign.points]  # as one would write it by hand
     at, frequency = Condition(20.0, 0.0), np.array([60.0, 400.0, 900.0])
     rows = (coarse, campaign.points), (fine, campaign.points), (fine, tuple(by_name))
-    first, *others = (beside(spindle, points, campaign.tests[0], at).computed(frequency) for spindle, points in rows)
+    first, *others = (beside(spindle, replace(campaign, points=tuple(points)), campaign.tests[0], at).computed(frequency) for spindle, points in rows)
     for other in others:
         assert other == pytest.approx(first, rel=0.02, abs=0.002 * np.abs(first).max())
 
@@ -102,10 +102,10 @@ def test_the_mass_of_a_sensor_goes_with_its_point(spindle, tmp_path):
     text = (tmp_path / "heavy" / "campaign.toml").read_text()
     assert text.count("sensor_mass_g = 2.5") == 1
     at, frequency = Condition(20.0), np.array([800.0, 1200.0, 2000.0])
-    plain, loaded = (beside(spindle, c.points, c.tests[0], at).computed(frequency) for c in (campaign, read_campaign(tmp_path / "heavy")))
+    plain, loaded = (beside(spindle, c, c.tests[0], at).computed(frequency) for c in (campaign, read_campaign(tmp_path / "heavy")))
     assert np.abs(loaded - plain).max() > 1e-3 * np.abs(plain).max()
     of_scene = replace(spindle, points=heavy.points)
-    assert beside(of_scene, campaign.points, campaign.tests[0], at).computed(frequency) == pytest.approx(loaded, rel=1e-9)  # told there alone
+    assert beside(of_scene, campaign, campaign.tests[0], at).computed(frequency) == pytest.approx(loaded, rel=1e-9)  # told there alone
     (tmp_path / "heavy" / "campaign.toml").write_text(text.replace("sensor_mass_g = 2.5", "sensor_mass_g = -2.5"))
     with pytest.raises(BadInput, match=r"points\.\d+\.sensor_mass_g = -2\.5: "):
         read_campaign(tmp_path / "heavy")

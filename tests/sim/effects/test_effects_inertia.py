@@ -9,10 +9,11 @@ from tests.effect_points import REST, RUNNING, at
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices, motion_rows
 from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.model.sensors import loaded
 from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.beside import measured_at
-from thermospindle.sim.campaign.campaign import Test
+from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.effects.structure import added_disk, hub_flexibility, sensor_mass
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
@@ -144,7 +145,7 @@ def test_sensor_mass_against_rayleigh(spindle):
 def test_sensor_mass_of_one_sensor(spindle):
     """A gram at (20, 0, 0) mm on the seat: one gram, none about x, 1e-3 x 0.02^2 about y and z."""
     seat = spindle.structure.body("seat")
-    found = sensor_mass.loaded(seat, spindle.point(5), 1e-3, 1.0)
+    found = loaded(seat, spindle.point(5), 1e-3, 1.0)
     assert found.mass - seat.mass == pytest.approx(1e-3)
     assert np.subtract(found.inertia, seat.inertia) == pytest.approx([0, 4e-7, 4e-7], abs=1e-15)
 
@@ -167,7 +168,8 @@ def test_a_sensor_whose_mass_is_told_is_in_the_model(spindle):
 def test_a_point_that_is_only_struck_has_no_sensor(spindle):
     """A roving hammer: the mass of the sensors is where they are read, and not at every point of the hammer. Eight grams of two accelerometers were 32 on a housing."""
     frf = Frf(np.array([800.0, 1200.0]), np.ones((1, 3, 2), complex), (5,), (1, 3, 6), "mobility")
-    own = measured_at(spindle, spindle.points, Test("roving", 20.0, 0.0, frf=frf))
+    test = Test("roving", 20.0, 0.0, frf=frf)
+    own = measured_at(spindle, Campaign("roving", spindle.name, "mobility", spindle.points, (test,)), test)
     assert [p.listens for p in own.points] == [True, False, False, False]
     masses = [at(own, Condition(20.0), sensor_mass, mass=m, turning_share=1.0).chain for m in (0.0, 1.0)]
     assert sum(b.mass for b in masses[1].bodies) - sum(b.mass for b in masses[0].bodies) == pytest.approx(1e-3, rel=1e-9)
@@ -176,10 +178,10 @@ def test_a_point_that_is_only_struck_has_no_sensor(spindle):
 def test_balanced_sensors_leave_the_centre_of_mass(spindle):
     """Half a gram at (12, 0, 20) mm on the hub and half its mirror image in z: the inertia of both, spread round the axis; a quarter shifts."""
     hub, point = spindle.structure.body("hub"), spindle.point(1)
-    found = sensor_mass.loaded(hub, point, 1e-3, 0.0)
+    found = loaded(hub, point, 1e-3, 0.0)
     arm = 20e-3 - hub.z
     assert (found.mass - hub.mass, found.z) == (pytest.approx(1e-3), pytest.approx(hub.z))
     across = 1e-3 * (12e-3**2 / 2 + arm**2)
     assert np.subtract(found.inertia, hub.inertia) == pytest.approx([across, across, 1e-3 * 12e-3**2], rel=1e-9)
-    quarter = sensor_mass.loaded(hub, point, 1e-3, 0.25)
+    quarter = loaded(hub, point, 1e-3, 0.25)
     assert quarter.mass * (quarter.z - hub.z) == pytest.approx(0.25e-3 * arm, rel=1e-9)

@@ -9,8 +9,11 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import frf, point_rows, poles
 from thermospindle.model.scene.reading import load
+from thermospindle.sim.campaign.beside import measured_at
+from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.effects.bearing import bond_softening
 from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, thermometer_error, window_damping
+from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
 
 LINES = np.linspace(500.0, 2500.0, 41)
@@ -55,6 +58,23 @@ def test_one_channel_alone_is_late_or_wrong(spindle):
         ratio = at(spindle, RUNNING, module, **values, channel=3.0).frf(LINES) / ideal(spindle)
         assert ratio[2] == pytest.approx(np.broadcast_to(third, ratio[2].shape), rel=1e-9)
         assert np.delete(ratio, 2, axis=0) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_channel_and_a_hammer_are_the_same_in_every_test(spindle):
+    """Tests that have sensors and hammer points in another order, or not all of them: the one that is meant is that of one node, and not of a row. The first node of each test was."""
+    frfs = [Frf(LINES, np.ones((len(nodes), len(struck), len(LINES)), complex), nodes, struck, "mobility") for nodes, struck in (((1, 2, 3), (1, 2)), ((3, 2, 1), (2, 1)), ((5, 2), (6, 2)))]
+    tests = tuple(Test(f"t{k}", 20.0, 0.0, frf=frf) for k, frf in enumerate(frfs))
+    campaign = Campaign("three", spindle.name, "mobility", spindle.points, tests)
+    assert (campaign.sensors, campaign.hammers) == ((1, 2, 3, 5), (1, 2, 6))
+    for test in tests:
+        own = measured_at(spindle, campaign, test)
+        plain = operating_point(own, RUNNING, ()).frf(LINES)[: len(test.frf.response_nodes)]
+        for module, values, size in ((sensor_gain, {"gain": 0.1}, 1.1), (channel_delay, {"delay": 50.0}, np.exp(-2j * np.pi * LINES * 50e-6))):
+            ratio = at(own, RUNNING, module, **values, channel=2.0).frf(LINES)[: len(plain)] / plain
+            for node, found in zip(test.frf.response_nodes, ratio, strict=True):
+                assert found == pytest.approx(np.broadcast_to(size if node == 2 else 1.0, found.shape), rel=1e-9)
+        missed = np.abs(at(own, RUNNING, hammer_position, offset=2.0, node=2.0).frf(LINES)[: len(plain)] / plain - 1).max(axis=(0, 2))
+        assert [bool(of > 1e-3) for of in missed] == [node == 2 for node in test.frf.reference_nodes]
 
 
 def test_a_window_in_some_tests_only(spindle):
