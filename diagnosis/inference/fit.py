@@ -36,8 +36,8 @@ AFAR = 30.0  # chi2 a number at the start, from which errors are enlarged first
 
 @dataclass(frozen=True)
 class Held:
-    """A shape parameter, by its number, at a limit that it would leave: half the slope of the cost towards the inside, and half its curvature with all else
-    fitted anew, with the prior's."""
+    """A shape parameter, by its number, at a limit that it would leave: half the slope of chi2 towards the inside, and half its curvature with all else
+    fitted anew, without its own prior's: what that is beside chi2 depends on how large errors are taken."""
 
     number: int
     slope: float
@@ -261,8 +261,9 @@ def _held(problem: Problem, p: Array, slope: Array, normal: Array) -> tuple[Held
         return ()
     free = np.setdiff1d(np.arange(problem.length), numbers)
     inner = np.linalg.solve(normal[np.ix_(free, free)], normal[np.ix_(free, numbers)])
-    curvature = np.diag(normal)[numbers] - np.einsum("ij,ij->j", normal[np.ix_(free, numbers)], inner)
-    return tuple(Held(int(n), abs(float(slope[n])), float(c)) for n, c in zip(numbers, curvature, strict=True))
+    curvature = np.diag(normal - problem.precision)[numbers] - np.einsum("ij,ij->j", normal[np.ix_(free, numbers)], inner)
+    by_data = np.abs(slope - problem.precision @ p)[numbers]
+    return tuple(Held(int(n), float(s), float(c)) for n, s, c in zip(numbers, by_data, curvature, strict=True))
 
 
 def _moved(problem: Problem, p: Array) -> Array:

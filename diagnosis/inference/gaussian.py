@@ -157,7 +157,7 @@ def ln_within_limits(fit: Fit, mean: Array, spread: Array, errors: float) -> flo
             low, high = ((limit - q.neutral) / q.prior_sd for limit in q.limits)
             if number in held:
                 h, far = held[number], abs(float(fit.point[number]))  # the prior, whose slope is that and whose curvature is one, knows of no errors
-                slope, curvature = (h.slope + far) / errors**2 - far, max((h.curvature - 1.0) / errors**2, 0.0) + 1.0
+                slope, curvature = h.slope / errors**2 - far, max(h.curvature, 0.0) / errors**2 + 1.0
                 scaled = slope / np.sqrt(curvature)
                 inside = scaled**2 / 2 + log_ndtr(-scaled) - np.log(curvature) / 2 - far**2 / 2
             else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +13,8 @@ from scipy.stats import norm
 from tests.diagnosis.inference.toy import toy
 from tests.virtual_campaign import effect
 from thermospindle.diagnosis.inference.evidence import Learned, amplitudes_apart, evidence
-from thermospindle.diagnosis.inference.fit import Held
-from thermospindle.diagnosis.inference.gaussian import impossible, opposite
+from thermospindle.diagnosis.inference.fit import Held, _held
+from thermospindle.diagnosis.inference.gaussian import impossible, ln_within_limits, opposite
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.parameters.nuisance import (
     DAMPING,
@@ -67,7 +68,7 @@ def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
     free[-1] = not held
     point[free] = np.linalg.solve(normal[np.ix_(free, free)], (whole.T @ right)[free])
     slope = float(whole[:, -1] @ (whole @ point - right) + point[-1])
-    stands = (Held(len(point) - 1, slope, 1 / np.linalg.inv(normal[np.ix_(kept, kept)])[-1, -1]),) if held else ()
+    stands = (Held(len(point) - 1, slope, 1 / np.linalg.inv(normal[np.ix_(kept, kept)])[-1, -1] - 1),) if held else ()
     moving = [j * np.append(np.ones(len(kept) - 1), not held) for j in jacobians]
     by_test = tuple((float((r := j @ point - v) @ r), m.T @ r, m.T @ m) for j, m, v in zip(jacobians, moving, y, strict=True))
     mechanism = replace(plain.mechanisms[0], shape=(Parameter("share", "1", 0.0, 0.0, 0.5, (0.0, 1.0), "", ""),))
@@ -88,6 +89,24 @@ def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
     with_it = np.linalg.inv(precision[np.ix_(others, others)])[np.ix_(part, part)]  # the shape as it is: its row and column of the precision left out
     assert found.as_shaped[0] == pytest.approx(root @ with_it @ root.T, rel=1e-6, abs=1e-9)
     assert np.trace(found.as_shaped[0]) < np.trace(found.size_covariance[0]) or held
+
+
+@pytest.mark.parametrize("errors", [1.0, 2.5])
+def test_what_a_shape_that_is_held_gives_up_does_not_depend_on_the_errors_of_its_fit(errors):
+    """Three standard deviations from where it is neutral, held by data that would have it farther: the integral over what is inside, by quadrature, of fits with errors as stated and as learned. That of a fit
+    with errors 2.5 times as large counted its prior as if they had been as stated, 0.6 off."""
+    share, low, slope, information = Parameter("share", "1", 0.0, 0.0, 0.5, (-1.5, 1.5), "", ""), -3.0, 30.0, np.array([[50.0, 20.0], [20.0, 40.0]])
+    p = np.array([0.0, low])
+    for fitted in (1.0, 2.5):
+        precision = fitted**2 * np.eye(2)
+        problem = SimpleNamespace(length=2, precision=precision, held=lambda p, slope: np.array([1]))
+        [held] = _held(problem, p, np.array([0.0, slope]) + precision @ p, information + precision)
+        done = SimpleNamespace(nuisance=np.zeros(1), mechanisms=(SimpleNamespace(shape=(share,)),), roots=(np.zeros((0, 0)),), held=(held,), point=p)
+        found = ln_within_limits(done, np.zeros(2), np.eye(2), errors)
+        x = np.linspace(0.0, 6.0, 20001)
+        curved = information[1, 1] - information[0, 1] ** 2 / (information[0, 0] + fitted**2)
+        exact = np.log(trapezoid(np.exp(-(slope * x + curved * x**2 / 2) / errors**2) * norm.pdf(low + x), x)) - np.log(norm.cdf(3.0) - norm.cdf(-3.0))
+        assert found == pytest.approx(exact, abs=1e-3)
 
 
 def test_a_shape_with_a_law_of_the_datas_own_says_nothing_of_amounts():
