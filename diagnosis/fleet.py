@@ -101,7 +101,7 @@ def _diagnosed(d: Diagnosis) -> Row:
     v = d.verdict
     own = v.told.evidence
     n = d.search.base.fit.count
-    before, after = (float(np.sqrt(h.evidence.chi2 / n)) for h in (d.search.base, v.accepted))
+    before, after = (float(np.sqrt(max(h.evidence.chi2, 0.0) / n)) for h in (d.search.base, v.accepted))
     parameters = d.search.model.parameters
     return {
         "verdict": v.word,

@@ -48,7 +48,7 @@ def run(
     check_band(spindle.hammer, str(spindle.file or spindle.name))
     points = []
     for temperature in temperatures:
-        points.append(operating_point(spindle, Condition(temperature, speed)))
+        points.append(operating_point(spindle, Condition(temperature, speed, spindle.hammer.level)))
         progress(f"{temperature:g} C: {points[-1].state.words}")
     tests = impact_tests(points, element=element, seed=seed, progress=progress)
     steps = []

@@ -66,6 +66,16 @@ def test_a_scene_whose_rows_are_shipped_is_swept(tmp_path, capsys):
     assert stiff > 1.02 * soft
 
 
+def test_no_number_of_a_row_is_left_out_of_the_file(tmp_path, capsys):
+    """Stiffnesses of roller bearings were computed, and had no column."""
+    text = 'title = "t"\nkind = "sweep"\nscene = "tailstock"\ntemperatures_C = [20]\nspeeds_rpm = [0]\n'
+    [row] = study(tmp_path, text)[1]
+    point = operating_point(load(ROOT / "scenes" / "tailstock"), Condition(20.0))
+    assert point.state.rollers
+    for b in point.state.all_bearings:
+        assert row[f"radial_stiffness_N_per_m.{b.name}"] == pytest.approx(b.stiffness[0, 0], rel=1e-9)
+
+
 def test_modes_that_move_far_keep_their_number_by_shape(tmp_path, capsys):
     """A mount three times as stiff lifts axial modes past rocking ones, by up to 68 %: by frequency an axial mode passed for the rocking one that it came near."""
     text = 'title = "t"\nkind = "sweep"\nscene = "hdd_2003"\ntemperatures_C = [20]\nspeeds_rpm = [7200]\n[vary]\n'

@@ -73,6 +73,9 @@ def test_two_runs_do_not_write_into_one_folder(tmp_path, capsys, undrawn):
     assert "another run is writing there" in capsys.readouterr().err
 
 
+HUGE = '"bearing_pair.preload_N" = { from = 10, to = 20, steps = 100000 }\n"section.hub_inertia" = { from = 1, to = 2, steps = 1000 }\n'
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -82,6 +85,7 @@ def test_two_runs_do_not_write_into_one_folder(tmp_path, capsys, undrawn):
         (DRAWN + "draws = 5\nrunout = true\n", "speeds_rpm needs a speed"),
         (DRAWN + 'draws = 5\ngrade = "precision"\n', "it needs runout = true"),
         (DRAWN + "draws = 1000000\nsobol = true\n", "at most 10000000 are allowed"),
+        (DRAWN.replace("monte-carlo", "sweep").replace("temperatures_C = [20, 60]\n", "") + "[vary]\n" + HUGE, "vary: 100000000 cases; at most 10000000 are allowed"),
         (DRAWN.replace("monte-carlo", "sweep") + "sobol = true\n", "sobol: is for kind = 'monte-carlo'"),
         (DRAWN.replace('scene = "hdd_2003"\n', "") + "draws = 5\n", "scene: missing"),
         (DRAWN + 'draws = 5\nscenes = ["hdd_2003", "mk7702"]\n', "scenes: is for kind = 'comparison'"),

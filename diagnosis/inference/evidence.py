@@ -77,10 +77,12 @@ class Evidence:
         return self.chi2 < -ROUNDED
 
 
-def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide: bool = False, kept: Sequence[Nuisances] = ()) -> Evidence:
+def evidence(
+    model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide: bool = False, kept: Sequence[Nuisances] = (), learning: Sequence[str] | None = None
+) -> Evidence:
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
-    errors are taken from the best of these, which is quick, and quicker with the nuisances `kept` of each (`integrated`). Build tolerances are as stated, or with `wide` as much wider as is likeliest. What a fit with the
-    data's own errors still owes is not counted."""
+    errors are taken from the best of these, which is quick, and quicker with the nuisances `kept` of each (`integrated`). Build tolerances are as stated, or with `wide` as much wider as is likeliest; with `learning` the
+    sizes of these kinds alone are learned, and errors are as stated. What a fit with the data's own errors still owes is not counted."""
     turn = amplitudes_apart(fit)
     by_test, gradient, information = at_one_size(fit), fit.gradient, fit.information
     if by_test is not fit.by_test:
@@ -93,6 +95,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     kinds |= {kinds_of.OF_CONDITIONS} if fit.moved.any() else set()
     kinds |= {kinds_of.ACTION} if fit.moved[1:].any() else set()
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds} | ({kinds_of.BUILD: tuple(WIDER)} if wide else {})  # last: modes may be off instead
+    grids = grids if learning is None else {kind: GRIDS[kind] for kind in learning if kind in kinds}
     own_grids = [own_grid(m) for m in fit.mechanisms]
     conditions = tuple(d.condition for d in model.tests)
     roots = [_roots(conditions, m.reference, counted_in(m), tuple(grid), len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
@@ -115,7 +118,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
         every = [(each(n.errors, n.sizes, own), n.errors, dict(n.sizes), own) for n, own in zip_longest(near, kept)]
         values, s, sizes, nuisances = max(every, key=lambda row: logsumexp(row[0]))
     else:
-        scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
+        scales = [1.0] if fit.temper < 1.0 or learning is not None else [float(s) for s in _error_scales(whole, fit.count)]
         values, s, sizes = likeliest(each, grids, scales)
     best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
     own = [tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)]
@@ -209,7 +212,7 @@ def turned(turn: csr_array, chi2: float, gradient: Array, information: Array, po
 
 
 def _error_scales(whole: Quadratic, count: int) -> Array:
-    """1, and above it steps of 5 % around the root of the least chi2 a number: errors are never taken smaller than stated."""
+    """1, and above it places around the root of the least chi2 a number: errors are never taken smaller than stated."""
     least = whole.constant - whole.b @ np.linalg.lstsq(whole.a + 1e-9 * np.eye(len(whole.b)), whole.b, rcond=None)[0]
     centre = np.sqrt(max(float(least) / count, 0.0))
     return np.array([1.0]) if centre < 1.02 else np.unique(np.concatenate([[1.0], np.maximum(centre * np.array([0.95, 1.0, 1.05, 1.2]), 1.0)]))

@@ -149,8 +149,7 @@ def _at_learned(model: CampaignModel, first: Fit) -> Settled:
     Far from the reference the quadratic about the fit is not to be trusted: a model that misses frequencies by a hundredth shifts peaks
     by more than their width.
     """
-    kinds = [kind for kind in GRIDS if kind not in ODDS and any(p.kind == kind for p in model.parameters)]
-    tried = [as_stated(dict(zip(kinds, row, strict=True)), first.mechanisms) for row in product(*(GRIDS[kind] for kind in kinds))]
-    learned = as_stated(evidence(model, first, tried).learned.sizes, first.mechanisms)
+    kinds = [kind for kind in GRIDS if kind not in ODDS]
+    learned = as_stated(evidence(model, first, learning=kinds).learned.sizes, first.mechanisms)
     found = fit(model, first.mechanisms, first.point, tempers=TEMPERS[-2:], learned=learned, moved=first.moved)
     return Settled(model, found, evidence(model, found, [learned]), first, learned)

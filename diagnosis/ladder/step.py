@@ -13,7 +13,7 @@ from thermospindle.diagnosis.forward.model import Applied, CampaignModel
 from thermospindle.diagnosis.ladder.fitting import Settled
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.prediction.modes import BEYOND, Predicted, predicted
-from thermospindle.diagnosis.prediction.partners import BELIEVABLE, numbered, paired
+from thermospindle.diagnosis.prediction.partners import BELIEVABLE, numbered, of_partners, paired
 from thermospindle.model.types import Array
 
 TEMPERATURE_APART = 0.5  # K, from which two tests show a shift
@@ -134,8 +134,8 @@ def _computed(model: CampaignModel, measured: MeasuredModes, nuisance: Array, ap
     for t, o in enumerate(measured.observations):
         p = _predicted(model, t, nuisance, applied[t])
         partner = paired(o, p)
-        frequency.append(np.where(partner < 0, np.nan, p.frequency[partner]))
-        damping.append(np.where(partner < 0, np.nan, p.damping[partner]))
+        frequency.append(of_partners(p.frequency, partner))
+        damping.append(of_partners(p.damping, partner))
     return np.concatenate(frequency), np.concatenate(damping)
 
 

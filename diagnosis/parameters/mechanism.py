@@ -206,9 +206,9 @@ def _asks(effect: Effect, spindle: Spindle, at: Condition) -> bool:
 
 
 def _places(conditions: Sequence[Condition]) -> Array:
-    """Temperature, speed, ln level and ln soak time (4, n), each over the distance within which departures are alike."""
+    """Temperature, speed, ln level and ln soak time (4, n), each over the distance within which departures are alike; heat and loads of balls know no sense of rotation."""
     t = np.array([c.temperature for c in conditions]) / MEMORY_K
-    n = np.array([c.speed for c in conditions]) / (MEMORY_RPM * RPM)
+    n = np.array([abs(c.speed) for c in conditions]) / (MEMORY_RPM * RPM)
     level = np.log(np.maximum([c.level for c in conditions], 0.1)) / MEMORY_LEVEL
     soak = np.log(np.clip([c.soak_time for c in conditions], 60.0, 1e6)) / MEMORY_SOAK
     return np.array([t, n, level, soak])
@@ -222,8 +222,7 @@ def likeness(conditions: Sequence[Condition], others: Sequence[Condition] | None
 
 def grown(conditions: Sequence[Condition], reference: Condition) -> Array:
     """How far (4, n) every test is from the reference in temperature, speed, level and soak: what grows in a straight line with each."""
-    away = _places(conditions) - _places([reference])
-    return np.array([away[0], np.abs(away[1]), *away[2:]])
+    return _places(conditions) - _places([reference])
 
 
 def shared(m: Mechanism, conditions: Sequence[Condition]) -> Array:

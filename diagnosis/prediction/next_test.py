@@ -80,7 +80,7 @@ def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
         weighed = [t for t in weighed if t.odds > TELLS]
         decide = [t for t in weighed if not t.beyond and t.odds >= np.exp(DECIDED)]
         if weighed:
-            tests.append(max(decide or weighed, key=lambda t: (min(t.odds, np.exp(CERTAIN)), -abs(t.condition.temperature - 20), -t.condition.speed)))
+            tests.append(max(decide or weighed, key=lambda t: (min(t.odds, np.exp(CERTAIN)), -abs(t.condition.temperature - 20), -abs(t.condition.speed))))
     return tests
 
 
@@ -95,12 +95,13 @@ def _predicted(model: CampaignModel, first: Standing, others: Sequence[Standing]
 
 
 def planned(model: CampaignModel) -> list[Condition]:
-    """Conditions that were not tested, hit and soaked as most tests of the campaign were."""
+    """Conditions that were not tested, hit and soaked as most tests of the campaign were, and turning the way that these did."""
     tested = [d.condition for d in model.tests]
     (how, _), = Counter((c.level, c.soak_time) for c in tested).most_common(1)
-    highest = max(model.spindle.nominal_speed, *(abs(c.speed) for c in tested))
+    way = np.copysign(1.0, sum(c.speed for c in tested))
+    highest = way * max(abs(model.spindle.nominal_speed), *(abs(c.speed) for c in tested))
     turns = any(b.turns for b in model.spindle.structure.bodies)
-    plans = [Condition(t, s * highest, *how) for t, s in product(TEMPERATURES, SPEEDS if turns else SPEEDS[:1])]
+    plans = [Condition(t, s and s * highest, *how) for t, s in product(TEMPERATURES, SPEEDS if turns else SPEEDS[:1])]
     return [plan for plan in plans if not any(same(plan, c) for c in tested)]
 
 

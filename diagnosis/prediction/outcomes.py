@@ -50,11 +50,12 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
         planned = migrated(DIAGNOSIS, json.loads(file.read_text(encoding="utf-8")), f"--predictions {file}")["next_test"]
         rows = [(dict(p["condition"]), dict(p["predicted"])) for p in planned]
         return [
-            _outcome(o, name, *_table(modes))
+            outcome
             for condition, predicted in rows
             for o in observations
             if _is(o, condition)
             for name, modes in predicted.items()
+            if (outcome := _outcome(o, name, *_table(modes))) is not None
         ]
     except OSError as error:
         raise BadInput(f"--predictions {file}: cannot be read: {error.strerror}") from None
@@ -93,8 +94,8 @@ def _is(o: Observation, planned: dict[str, Any]) -> bool:
     return "added_mass_g" not in planned and same(o.condition, Condition(planned["temperature_C"], planned["speed_rpm"] * RPM, level, soak))
 
 
-def _outcome(o: Observation, name: str, predicted: Array, common: Array) -> Outcome:
-    """Modes paired in the way that costs least in ln frequency; frequencies and, where known and predicted, ln damping ratios."""
+def _outcome(o: Observation, name: str, predicted: Array, common: Array) -> Outcome | None:
+    """Modes paired in the way that costs least in ln frequency; frequencies and, where known and predicted, ln damping ratios. None of a test in which no mode was found: it says nothing."""
     seen, expected = pairs(ModeSet(o.frequency), ModeSet(predicted[:, 0]), NEAREST).T
     frequency, sd, damping, damping_sd = predicted[expected].T
     off = np.log(np.concatenate([o.frequency[seen] / frequency, o.damping[seen] / damping]))
@@ -103,6 +104,8 @@ def _outcome(o: Observation, name: str, predicted: Array, common: Array) -> Outc
     measured = np.concatenate([seen, len(o.frequency) + seen])
     variance = np.diag(o.covariance)[measured] + np.concatenate([own, (damping_sd / damping) ** 2])
     known = np.isfinite(variance)
+    if not known.any():
+        return None
     both = np.concatenate([shared, np.zeros_like(shared)])[known]
     covariance = o.covariance[np.ix_(measured[known], measured[known])] + both @ both.T
     np.fill_diagonal(covariance, variance[known] + np.sum(both**2, axis=1))

@@ -13,7 +13,7 @@ import numpy as np
 
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.diagnosis.prediction.modes import Predicted
-from thermospindle.model.types import ComplexArray, Integers
+from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import COMPARED, COMPUTED, MIXING, at_shared, in_order, kept_in_order
@@ -35,8 +35,15 @@ def paired(o: Observation, p: Predicted) -> Integers:
 def partners(o: Observation, p: Predicted) -> Integers:
     """The same, and -1 too where no computed mode is within `BELIEVABLE`."""
     partner = paired(o, p)
-    far = np.abs(p.frequency[partner] / o.frequency - 1) > BELIEVABLE
-    return np.where(far | (partner < 0), -1, partner)
+    near = np.abs(of_partners(p.frequency, partner) / o.frequency - 1) <= BELIEVABLE
+    return np.where(near, partner, -1)
+
+
+def of_partners(values: Array, partner: Integers) -> Array:
+    """What of computed modes belongs to every measured one; NaN for one without a partner."""
+    found = np.full(len(partner), np.nan)
+    found[partner >= 0] = values[partner[partner >= 0]]
+    return found
 
 
 def numbered(observed: Sequence[Observation], predicted: Sequence[Predicted]) -> list[dict[int, int]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ SECONDS = 0.6
 
 
 def set_down(imperfections: Imperfections, balls: Mapping[str, int], random: np.random.Generator) -> Imperfections:
-    """The same imperfections with every ball set at another azimuth, and every ball turned; `balls` of each bearing's rows."""
+    """The same imperfections with every ball set at another azimuth, and every ball turned; `balls` of each row of the bearings."""
     rows = {name: _set_down(row, balls[name], random) for name, row in imperfections.bearings.items()}
     return replace(imperfections, bearings=rows)
 
@@ -41,6 +42,11 @@ def _set_down(row: RowImperfections, balls: int, random: np.random.Generator) ->
         """A row `turned` / Z on meets the waves it feels, of order k Z or k Z +- 1, so much of k Z later; their own place on the ring stays."""
         return tuple(replace(w, phase=w.phase + round(w.order / balls) * turned) for w in waves)
 
+    def onward(each: tuple[Any, ...]) -> tuple[Any, ...]:
+        """What belongs to each element, row by row."""
+        rows = [each[k : k + balls] for k in range(0, len(each), balls)]
+        return tuple(of_it for row in rows for of_it in (row[-further:] + row[:-further]))
+
     of_ball = tuple(
         tuple(replace(w, phase=w.phase + w.order * spin) for w in waves) for waves, spin in zip(row.ball_waves, spins, strict=False)
     )
@@ -50,8 +56,8 @@ def _set_down(row: RowImperfections, balls: int, random: np.random.Generator) ->
         inner_axial=seen(row.inner_axial),
         outer_radial=seen(row.outer_radial),
         outer_axial=seen(row.outer_axial),
-        ball_diameter=row.ball_diameter[-further:] + row.ball_diameter[:-further],
-        ball_waves=of_ball[-further:] + of_ball[:-further],
+        ball_diameter=onward(row.ball_diameter),
+        ball_waves=onward(of_ball),
         cage_phase=row.cage_phase + 2 * np.pi * further / balls,
     )
 

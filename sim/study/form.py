@@ -169,7 +169,7 @@ def read_study(file: Path) -> Study:
         sobol=form.sobol,
         digest=hashlib.sha256(file.read_bytes()).hexdigest()[:16],
     )
-    if (count := study.combinations() * len(study.temperatures or ()) * len(study.speeds)) > MOST:
+    if (count := study.combinations() * max(len(study.temperatures or ()), 1) * len(study.speeds)) > MOST:
         raise BadInput(f"{file}: vary: {count} cases; at most {MOST} are allowed")
     return study
 

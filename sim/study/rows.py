@@ -159,7 +159,7 @@ class Cases:
             fields |= {f"{key}.{b.name}": pa.float64() for key in OF_ROW} | {f"in_contact.{b.name}": pa.bool_()}
             if self.study.kind == MONTE_CARLO:
                 fields[f"unloads_C.{b.name}"] = pa.float64()
-        for name in (*(b.name for b in self.spindle.bearings), *(b.name for b in self.spindle.linear_bearings)):
+        for name in (b.name for b in self.spindle.all_bearings):
             fields |= {f"{key}.{name}": pa.float64() for key in OF_BEARING}
         if self.study.runout:
             fields |= {f"{key}.{_plain(probe)}": pa.float64() for key in of_runout(self.spindle) for probe in (X, Y, AXIAL)}
@@ -176,7 +176,8 @@ def cases(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, ca
             own[condition] = point, point.modes_below(study.highest or spindle.hammer.band[1])
     found = Cases(study, raw, file, spindle, catalogue, own)
     if found.count > MOST:
-        raise BadInput(f"{study.file}: draws = {study.draws}: with sobol = true that is {found.count} cases; at most {MOST} are allowed")
+        key = f"draws = {study.draws}{': with sobol = true that is' if study.sobol else ':'}" if study.kind == MONTE_CARLO else "vary:"
+        raise BadInput(f"{study.file}: {key} {found.count} cases; at most {MOST} are allowed")
     return found
 
 

@@ -90,6 +90,12 @@ def computed(spindle, o, pole, shape, kind) -> Predicted:
     return replace(predict(spindle, o, ()), pole=pole, shape=shape, participation=np.ones((len(pole), 1)), kind=kind)
 
 
+def test_where_nothing_is_computed_nothing_has_a_partner(spindle):
+    """A model without a mode that low ended in an IndexError."""
+    o = replace(nothing(spindle, Test("t", 20.0, 0.0)), frequency=np.array([1840.0]), damping=np.full(1, 0.01), kind=None)
+    assert partners(o, computed(spindle, o, at(), np.zeros((0, 4), complex), ())).tolist() == [-1]
+
+
 def test_partners_cross_where_shapes_do(spindle):
     """The axial mode keeps its partner while rocking modes 10 % off pass it."""
     shape = np.array([[1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], complex)

@@ -75,6 +75,12 @@ def test_a_test_is_judged_by_what_was_planned_like_it(planned, level, soak, judg
     assert len(outcomes(file, [seen])) == judged
 
 
+def test_a_test_in_which_no_mode_was_found_confirms_nothing(tmp_path):
+    """It confirmed whatever was predicted, with an error of no number."""
+    said = told(tmp_path, {"one": [{"frequency_Hz": 900.0, "sd_Hz": 1.0}]})
+    assert said([Observation(Test("t", 60.0, 0.0), Condition(60.0), np.zeros(0), np.zeros(0), np.zeros((0, 0)), *[None] * 5)]) == {}
+
+
 def test_another_file_is_refused(tmp_path):
     file = tmp_path / "other.json"
     file.write_text("{}")

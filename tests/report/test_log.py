@@ -27,7 +27,8 @@ from thermospindle.report.log.told import describe
 from thermospindle.sim import posing
 from thermospindle.sim.hammer.test import impact_tests
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.run import Run, Step, measured_campaigns
+from thermospindle.sim.run import Run, Step, as_campaign, measured_campaigns
+from thermospindle.sim.run import run as chain
 
 HDD = Path(__file__).parents[2] / "scenes" / "hdd_2003"
 
@@ -332,3 +333,11 @@ def test_a_file_cut_short_is_refused(share: float, file: Path, tmp_path: Path) -
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(BadInput, match=r"cut\.rrd"):
         read_log(path)
+
+
+def test_tests_are_hit_as_hard_as_their_model_says() -> None:
+    """A campaign tells the force of its hits, and effects of the force act by it: it was told one that its model had not."""
+    spindle = load(HDD)
+    spindle = replace(spindle, hammer=replace(spindle.hammer, hits=1, record_length=0.02, level=5.0))
+    made = chain(spindle, [20.0])
+    assert [t.level for t in as_campaign(made, "virtual").tests] == [s.point.condition.level for s in made.steps] == [5.0]

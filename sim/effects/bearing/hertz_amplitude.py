@@ -71,7 +71,7 @@ EFFECT = Effect(
     title="Hammer level softens the Hertz contacts",
     equation=(
         "K -> K k(a), k(a) = 2 / (1.5 pi a) int_0^pi max(1 + a cos t, 0)^1.5 cos t dt = 1 - a^2 / 32 - ..., "
-        "a = scale (level / 2) / (n sin(alpha) k_ball d0): the peak force, shared by the bearings, as a static axial load, times "
+        "a = scale (level / bearings) / (n sin(alpha) k_ball d0): the peak force, shared by the ball rows, as a static axial load, times "
         "(c_ref / c)^(1 - softness_power) with c = 1 / (n sin(alpha) k_ball), where mass and damping rather than contacts limit the motion "
         "(harmonic balance: Nayfeh & Mook, Nonlinear Oscillations, 1979, ch. 2)"
     ),

@@ -14,8 +14,11 @@ def condition(spindle: Spindle, condition: Condition, values: Values) -> Conditi
 
 
 def idle(spindle: Spindle) -> str | None:
-    """Rings that move, bearings told over temperature and effects of the scene depend on it; parts are at the reference otherwise, their moduli too."""
-    if spindle.rolling or spindle.effects or any(len(b.temperature) > 1 for b in spindle.linear_bearings):
+    """Rings that move, bearings told over temperature, moduli of shafts and joints and effects of the scene depend on it."""
+    structure = spindle.structure
+    elastic = {s.material for shaft in structure.shafts for s in shaft.segments} | {j.material for j in structure.joints if j.material}
+    softens = any(len(set(spindle.materials[name].youngs_modulus.value)) > 1 for name in elastic)
+    if spindle.rolling or spindle.effects or softens or any(len(b.temperature) > 1 for b in spindle.linear_bearings):
         return None
     return "nothing of this scene depends on temperature"
 

@@ -109,6 +109,12 @@ def test_what_is_only_left_predicts_nothing(one_test):
     assert next_tests(SimpleNamespace(model=model), verdict) == []
 
 
+def replace_speeds(model, speed):
+    """The model with a test that turns beside those at rest."""
+    own = SimpleNamespace(condition=Condition(40.0, speed, 50.0, 60.0))
+    return SimpleNamespace(tests=[*model.tests, own], spindle=model.spindle)
+
+
 def test_tests_are_planned_as_the_campaign_was_made():
     """Hit and soaked as most tests were: predictions at no force for ever in the chamber were judged by tests at 50 N after a minute."""
     tests = [SimpleNamespace(condition=Condition(t, 0.0, *how)) for t, how in ((20.0, (50.0, 60.0)), (40.0, (50.0, 60.0)), (60.0, ()))]
@@ -117,6 +123,9 @@ def test_tests_are_planned_as_the_campaign_was_made():
     )
     assert {plan.speed for plan in planned(standing)} == {0.0}
     plans = planned(turning)
+    back = replace_speeds(turning, -300.0)
+    assert {p.speed for p in planned(back)} == {-p.speed for p in plans}  # the other way, as its tests
+    assert Condition(40.0, -700.0, 50.0, 60.0) not in planned(replace_speeds(turning, -700.0))
     assert {(p.level, p.soak_time) for p in plans} == {(50.0, 60.0)}
     assert Condition(20.0, 0.0, 50.0, 60.0) not in plans
     assert Condition(60.0, 0.0, 50.0, 60.0) in plans

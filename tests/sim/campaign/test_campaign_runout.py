@@ -197,6 +197,15 @@ def test_setting_the_balls_down_elsewhere_changes_phases_alone(spindle) -> None:
     assert len(turned) > 8
 
 
+def test_the_balls_of_one_row_stay_in_it() -> None:
+    """Of a bearing with two rows they went from one to the other."""
+    row = RowImperfections(ball_diameter=(1e-6, 2e-6, 3e-6, 11e-6, 12e-6, 13e-6))
+    seen = [set_down(Imperfections(bearings={"front": row}), {"front": 3}, np.random.default_rng(seed)).bearings["front"].ball_diameter for seed in range(8)]
+    assert len(set(seen)) > 1
+    for of in seen:
+        assert (set(of[:3]), set(of[3:])) == (set(row.ball_diameter[:3]), set(row.ball_diameter[3:]))
+
+
 def test_five_probes_see_the_hub_in_two_planes(spindle) -> None:
     points = hub_points(spindle)
     assert [p.node for p in points] == [8, 9, 10, 11, 12]

@@ -13,6 +13,7 @@ from thermospindle.diagnosis.add import new_scene
 from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
+from thermospindle.model.material import Law
 from thermospindle.model.scene.reading import build, load
 from thermospindle.sim.effects import CATALOGUE, by_name, usable
 from thermospindle.sim.effects.effect import called, fitted_to, refusal
@@ -72,6 +73,16 @@ def test_a_free_turning_shaft_is_no_cantilever(spindle):
     held = [j for j in spindle.structure.joints if "shaft" not in j.bodies]
     free = replace(spindle, structure=replace(spindle.structure, joints=tuple(held)))
     assert "turns free between its bearings" in refusal(by_name("shaft_bending"), free)
+
+
+def test_a_thermometer_matters_where_a_modulus_depends_on_temperature():
+    """A free shaft of a steel that softens: nothing of it was said to depend on temperature."""
+    shaft, effect = load(SCENE.parent / "free_shaft"), by_name("thermometer_error")
+    assert "nothing of this scene depends on temperature" in refusal(effect, shaft)
+    name = shaft.structure.shafts[0].segments[0].material
+    steel = shaft.materials[name]
+    softening = replace(steel, youngs_modulus=Law((0.0, 100.0), (steel.youngs_modulus(20.0), 0.95 * steel.youngs_modulus(20.0))))
+    assert refusal(effect, replace(shaft, materials={**shaft.materials, name: softening})) is None
 
 
 def test_a_spring_leaves_nothing_to_constant_force(raw):
