@@ -6,13 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
 import scipy
 
 from thermospindle.model.bearing.ball_row import BallRow
 from thermospindle.model.bearing.centred import Centres, centred_axial, centred_axial_force
 from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.types import Array
 
+MOST, LEAST = 100, 1e-6  # steps of many parts, and how short they get
 STEPS = 20  # of Newton's method, which takes six
 FARTHEST = 1e-4  # m, in one of them
 EXACT, ROUNDED = 1e-17, 1e-15  # m, of what is left of a step, and below which a step that does not get shorter is rounding
@@ -118,3 +121,81 @@ def _root(imbalance: Callable[[float], float], start: float, reach: float) -> fl
             return float(scipy.optimize.brentq(imbalance, start - reach, start + reach, xtol=EXACT, rtol=1e-14))
         reach *= 4
     raise NoEquilibrium(f"the bearings find no axial equilibrium within {reach * 1e3:.1f} mm of hub movement")
+
+
+# ---------------------------------------------------------------- of many parts
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What the movements (m) of n parts along the axis balance: of every row its outer ring's movement against its inner one, `motion` (rows, n) times those of the parts, and the force (N) that was on it as
+    it was put together, `at_reference` (rows,); sleeves: which rows slide on a spring, its push in the sense of z (N) and its rate; the `stiffness` (n, n) of joints between parts, and the `load` on them (n,)."""
+
+    rows: tuple[BallRow, ...]
+    motion: Array
+    at_reference: Array
+    sleeves: tuple[tuple[tuple[int, ...], float, float], ...]
+    stiffness: Array
+    load: Array
+
+    def moves(self, y: Array) -> Array:
+        """Movements (rows,) for those of the parts and, after these, of the rings on sleeves."""
+        n = self.motion.shape[1]
+        found = self.motion @ y[:n]
+        for (own, _, _), slid in zip(self.sleeves, y[n:], strict=True):
+            found[list(own)] = slid
+        return np.asarray(found)
+
+    def imbalance(self, y: Array, rows: tuple[BallRow, ...], centres: Centres) -> tuple[Array, Array]:
+        """Of every part and sleeve what is out of balance (N), and its derivatives."""
+        n, answers = self.motion.shape[1], np.array([centred_axial(row, float(m), centres) for row, m in zip(rows, self.moves(y), strict=True)])
+        force, slope = answers.T
+        sliding = [i for own, _, _ in self.sleeves for i in own]
+        fixed = np.setdiff1d(np.arange(len(rows)), sliding)
+        off, by = np.zeros(len(y)), np.zeros((len(y), len(y)))
+        off[:n] = self.motion[fixed].T @ (force - self.at_reference)[fixed] + self.stiffness @ y[:n] - self.load
+        by[:n, :n] = self.motion[fixed].T @ (slope[fixed, None] * self.motion[fixed]) + self.stiffness
+        for k, (own, push, rate) in enumerate(self.sleeves, n):
+            way = self.motion[own[0]]
+            less = rate * (y[k] - way @ y[:n])  # than its push
+            off[:n] -= way * less
+            off[k] = sum(force[list(own)]) - push + less
+            by[:n, :n] += rate * np.outer(way, way)
+            by[:n, k] -= rate * way
+            by[k, :n] -= rate * way
+            by[k, k] = sum(slope[list(own)]) + rate
+        return off, by
+
+
+def balanced(parts: Parts, centres: Centres) -> Array:
+    """Movement (m) of every row's outer ring against its inner one, by Newton's method, shortened as long as the next step would not be shorter (Deuflhard, *Newton Methods for Nonlinear Problems*, 2004, 3.3); that of
+    balls with inertia is sought from the answer of balls without, whose energy is convex. Raises `NoEquilibrium`."""
+    y = np.zeros(parts.motion.shape[1] + len(parts.sleeves))
+    y = _stepped(parts, y, tuple(changed(row, inertia=None) for row in parts.rows), centres)
+    return parts.moves(_stepped(parts, y, parts.rows, centres))
+
+
+def _stepped(parts: Parts, y: Array, rows: tuple[BallRow, ...], centres: Centres) -> Array:
+    off, by = parts.imbalance(y, rows, centres)
+    last = np.inf
+    for _ in range(MOST):
+        move = _solved(by, -off)
+        length = float(np.abs(move).max(initial=0.0))
+        if length <= EXACT or (length < ROUNDED and length > last / 2):
+            return y
+        share = min(1.0, FARTHEST / length)
+        while True:
+            there = y + share * move
+            off, here = parts.imbalance(there, rows, centres)
+            if np.abs(_solved(by, off)).max() <= (1 - share / 4) * length or length < 1e3 * ROUNDED:
+                break
+            share /= 2
+            if share < LEAST:
+                raise NoEquilibrium("the bearings find no axial equilibrium")
+        y, by, last = there, here, length
+    raise NoEquilibrium("the bearings find no axial equilibrium")
+
+
+def _solved(by: Array, off: Array) -> Array:
+    """Where rows hang loose, the shortest move of many."""
+    return np.asarray(np.linalg.lstsq(by, off, rcond=1e-14)[0])

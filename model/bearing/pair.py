@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from math import sin
 
 import numpy as np
-import scipy
 
 from thermospindle.model.bearing.ball_row import BallRow
-from thermospindle.model.bearing.centred import Centres, centred, centred_axial_force
+from thermospindle.model.bearing.centred import Centres, centred
 from thermospindle.model.bearing.heavy_ball.inertia import Vector
-from thermospindle.model.bearing.movement import Rings, Sleeve, equilibrium
+from thermospindle.model.bearing.movement import Parts, Rings, Sleeve, balanced, equilibrium
 from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.row import row_at
 from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
@@ -196,9 +195,7 @@ def _positions(spindle: Spindle, rotor: Rotor, every: Mapping[str, BallRow], cen
     """Movement (m) of every row's outer ring against its inner one, for one group of rows that share carriers."""
     rows = {name: every[name] for name in rotor.of}
     if len(rotor.carriers) > 2:
-        if rotor.springs or spindle.axial_load:
-            raise NoEquilibrium(f"rings on springs and axial loads are for one rotor in one housing; here are {', '.join(rotor.carriers)}")
-        return _many_positions(spindle, rows, rotor)
+        return _many_positions(spindle, rows, rotor, centres)
     towards, sliding = rotor.towards, {name for names, _, _ in rotor.springs for name in names}
     fixed = tuple((row, towards[name]) for name, row in rows.items() if name not in sliding)
     sleeves = tuple(Sleeve(tuple(rows[n] for n in names), towards[names[0]], push, rate) for names, push, rate in rotor.springs)
@@ -212,30 +209,68 @@ def _positions(spindle: Spindle, rotor: Rotor, every: Mapping[str, BallRow], cen
     return moved
 
 
-def _many_positions(spindle: Spindle, rows: Mapping[str, BallRow], rotor: Rotor) -> dict[str, float]:
-    """As `_positions` for more than two carriers, as of rotors within rotors: all balances at once, by Powell's hybrid method.
+def _many_positions(spindle: Spindle, rows: Mapping[str, BallRow], rotor: Rotor, centres: Centres) -> dict[str, float]:
+    """As `_positions` for more than two carriers, as of rotors within rotors, or of rings in parts that joints hold together.
 
-    The energy of rows without ball inertia is convex in the positions, so that their answer is unique; it is the start for those with it.
+    A spindle is preloaded as it is put together: at the reference every row has its preload, joints hold what that asks of them, and from there on they give.
     """
-    names, unknown = list(rows), rotor.carriers[1:]
-    motion = np.array([[(rotor.of[n][1] == c) - (rotor.of[n][0] == c) for c in unknown] for n in names], float)
-    outside = np.zeros(len(names))
-    for s in rotor.sets:
-        if spindle.one_way(s):
-            for name in s.bearings:
-                outside[names.index(name)] = spindle.bearing(name).sense * s.preload / len(s.bearings)
-    scale = max(b.preload for b in spindle.bearings)
+    names, held = list(rows), _held_by(spindle, rotor)
+    motion = np.array([[(rotor.of[n][1] == c) - (rotor.of[n][0] == c) for c in held.parts] for n in names], float)
+    at_reference = np.array([spindle.bearing(n).sense * spindle.bearing(n).preload if n in held.preloaded else 0.0 for n in names])
+    sleeves = tuple((tuple(names.index(n) for n in ring_of), push, rate) for ring_of, push, rate in rotor.springs)
+    parts = Parts(tuple(rows.values()), motion, at_reference, sleeves, held.stiffness, _loaded_part(spindle, rotor, held.parts))
+    try:
+        return dict(zip(names, balanced(parts, centres).tolist(), strict=True))
+    except NoEquilibrium as error:
+        raise NoEquilibrium(f"{error}; they lie between {', '.join(rotor.carriers)}") from None
 
-    def imbalance(z: Array, at: Sequence[BallRow]) -> Array:
-        force = np.array([centred_axial_force(row, float(m)) for row, m in zip(at, motion @ (1e-6 * z), strict=True)])
-        return np.asarray(motion.T @ (force - outside)) / scale
 
-    massless = [changed(row, inertia=None) for row in rows.values()]
-    start = scipy.optimize.root(imbalance, np.zeros(len(unknown)), args=(massless,), options={"xtol": 1e-13})
-    end = scipy.optimize.root(imbalance, start.x, args=(list(rows.values()),), options={"xtol": 1e-13})
-    if np.abs(end.fun).max() > 1e-6:
-        raise NoEquilibrium(f"the bearings between {', '.join(rotor.carriers)} find no axial equilibrium")
-    return {name: float(m) for name, m in zip(names, motion @ (1e-6 * end.x), strict=True)}
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What holds the carriers of one rotor's rings along the axis: the `parts` (n,) that may move, these carriers and what joints tie them to, with the `stiffness` (n, n) of the joints between them
+    and to the ground; and the rows that are `preloaded` against each other through carriers that joints tie together, or from outside."""
+
+    parts: tuple[str, ...]
+    stiffness: Array
+    preloaded: frozenset[str]
+
+
+def _held_by(spindle: Spindle, rotor: Rotor) -> Held:
+    structure = spindle.structure
+    carried = [(structure.carrier(j.bodies[0]), structure.carrier(j.bodies[1]), j.stiffness[2]) for j in structure.own_joints]
+    ties = [(a, b, k) for a, b, k in carried if k > 0 and a != b]
+    group = {part: {part} for part in dict.fromkeys([*rotor.carriers, *(part for a, b, _ in ties for part in (a, b))])}
+    for a, b, _ in ties:
+        together = group[a] | group[b]
+        group |= dict.fromkeys(together, together)
+    tied = {part for c in rotor.carriers for part in group[c]}
+    still = "ground" if "ground" in tied else rotor.carriers[0]
+    parts = tuple(part for part in group if part in tied and part != still)
+    at, stiffness = {part: i for i, part in enumerate(parts)}, np.zeros((len(parts), len(parts)))
+    for a, b, k in ties:
+        ends = [at[part] for part in (a, b) if part in at]
+        stiffness[ends, ends] += k
+        if len(ends) == 2:
+            stiffness[ends, ends[::-1]] -= k
+
+    def between(name: str) -> frozenset[frozenset[str]]:
+        return frozenset(frozenset(group[c]) for c in rotor.of[name])
+
+    rigid = [s for s in rotor.sets if spindle.one_way(s) or len({between(name) for name in s.bearings}) == 1]
+    return Held(parts, stiffness, frozenset(name for s in rigid for name in s.bearings))
+
+
+def _loaded_part(spindle: Spindle, rotor: Rotor, parts: Sequence[str]) -> Array:
+    """The axial load on each part (n,): on the one that carries all outer rings, or its opposite on the one that carries all inner ones, for bearings feel the motion between both alone."""
+    load = np.zeros(len(parts))
+    if spindle.axial_load:
+        inner, outer = ({pair[k] for pair in rotor.of.values()} for k in (0, 1))
+        ways = [(on, force) for own, force in ((outer, spindle.axial_load), (inner, -spindle.axial_load)) if len(own) == 1 for on in own if on in parts]
+        if not ways:
+            raise NoEquilibrium(f"axial_load_N = {spindle.axial_load:g}: there is no one part that carries all inner rings, or all outer ones, for it to act on; rings are on {', '.join(rotor.carriers)}")
+        on, force = ways[0]
+        load[parts.index(on)] = force
+    return load
 
 
 def contact_status(bearings: tuple[BearingState, ...]) -> str:
