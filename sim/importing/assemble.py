@@ -67,7 +67,7 @@ def read(
     measured = scene.hammer.band if scene is not None and form.band_Hz is None and form.records.band_Hz is None else None
     if groups and scene is not None and measured:
         notes.append(f"time records: kept from {measured[0]:g} to {measured[1]:g} Hz, where the hammer test of {scene.name} is; band_Hz under [records] keeps another band")
-    lengths: list[float] = []
+    lengths: dict[str, list[float]] = {}
     uneven: list[str] = []  # tests whose hits are not of one length
     for (test, _), made in of_records(groups, form.records, measured).items():
         notes += made.notes
@@ -75,11 +75,12 @@ def read(
         curves.setdefault(test, []).extend(made.curves)
         if made.curves:
             pretrigger[test] = made.pretrigger
-            lengths.append(made.length)
+            lengths.setdefault(test, []).append(made.length)
         if made.window_decay > 0 and abs(window.setdefault(test, made.window_decay) / made.window_decay - 1) > 1e-9:
             uneven.append(test)
-    longest = np.floor(min(lengths, default=0.0) / SHORT) * SHORT
-    questions += [Question(f"test {t}", "hit_length_s", f"one length for all hits, so that one window fits all its FRFs; at most {longest:g}, which all of them have") for t in dict.fromkeys(uneven)]
+    uneven += [test for test, of_it in lengths.items() if max(of_it) > (1 + 1e-9) * min(of_it)]
+    longest = np.floor(min((length for of_it in lengths.values() for length in of_it), default=0.0) / SHORT) * SHORT
+    questions += [Question(f"test {t}", "hit_length_s", f"one length for all hits, so that one window, and the same lines, fit all its FRFs; at most {longest:g}, which all of them have") for t in dict.fromkeys(uneven)]
     questions += open_parts(curves)
     own_curves = [(x.file.name, x) for every in curves.values() for x in every if not x.magnitude_only]
     told = _ends(own_curves, contents)

@@ -20,6 +20,7 @@ from thermospindle.sim.importing.records.grouped import Records
 from thermospindle.sim.importing.records.hits import TOUCHING, Hit, check_numbers, fault, hits_of, limits_of
 from thermospindle.sim.importing.records.windows import ENDS_AT, contact_time, end_needed, excited, first_heard, shared
 
+ALIKE = 1.1  # times the shortest hits of a test, up to which others are cut to these
 SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
 
 
@@ -38,13 +39,20 @@ class FromRecords:
 
 
 def of_records(groups: Records, form: RecordForm, measured: tuple[float, float] | None = None) -> dict[tuple[str, End], FromRecords]:
-    """The FRFs of every hammer point of every test (`frfs_of`). A test has one window: where one of its points needs it, all have it, whose damping is in all their FRFs then."""
+    """The FRFs of every hammer point of every test (`frfs_of`). A test has one window: where one of its points needs it, all have it, whose damping is in all their FRFs then. And it has one length of hits, for its lines
+    to be the same: the shortest where others are little longer, as by the jitter of a trigger."""
     found = {(test, reference): frfs_of(files, reference, form, measured) for (test, reference), files in groups.items()}
     windowed = {test for (test, _), made in found.items() if made.window_decay > 0}
-    as_others = form.model_copy(update={"exponential_end": ENDS_AT})
+    shortest: dict[str, float] = {}
+    for (test, _), made in found.items():
+        if made.curves:
+            shortest[test] = min(made.length, shortest.get(test, made.length))
     for (test, reference), made in found.items():
-        if test in windowed and made.window_decay == 0 and made.curves:
-            found[test, reference] = frfs_of(groups[test, reference], reference, as_others, measured)
+        if made.curves:
+            end = {"exponential_end": ENDS_AT} if test in windowed and made.window_decay == 0 else {}
+            length = {"hit_length_s": shortest[test]} if shortest[test] < made.length <= ALIKE * shortest[test] else {}
+            if end or length:
+                found[test, reference] = frfs_of(groups[test, reference], reference, form.model_copy(update=end | length), measured)
     return found
 
 

@@ -47,7 +47,7 @@ def test_hits_that_are_not_of_one_length_are_asked_about_where_the_form_can_be_a
     files, form = [tmp_path / f"T20_n0_hammer{q}.csv" for q in (1, 2)], tmp_path / "form.toml"
     bring(files, mapping=form)
     line = next(row for row in form.read_text().splitlines() if row.startswith('hit_length_s = "?"'))
-    longest = re.search(r"one length for all hits, so that one window fits all its FRFs; at most ([\d.]+), which all of them have", line)[1]
+    longest = re.search(r"one length for all hits, so that one window, and the same lines, fit all its FRFs; at most ([\d.]+), which all of them have", line)[1]
     assert 0.9 * short / RATE < float(longest) <= short / RATE  # what follows the last hit is shorter than a gap
     (tmp_path / "m.toml").write_text(MAPPING.replace("hammer*", "*") + form.read_text()[form.read_text().index("[records]") :].replace('"?"', longest))
     notes = "\n".join(bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"])

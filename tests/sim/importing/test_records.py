@@ -253,6 +253,31 @@ def test_where_one_point_needs_a_window_all_of_a_test_have_it(tmp_path):
     assert np.abs(test.frf.value[0, 1] - plain).max() > 0.2 * np.abs(of_fast).max()
 
 
+@pytest.mark.parametrize(("shift", "asked"), [(1, False), (25, False), (2500, True)])
+def test_hits_that_begin_a_little_later_at_one_point_have_the_lines_of_the_others(tmp_path, shift, asked):
+    """A file a hammer point, of records equally long, in one of which the trigger came later: it was refused for lines that were another, and told to be a test of its own. Where hits would lose much of their length it is asked."""
+    random = np.random.default_rng(9)
+    force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
+    for q in (1, 2):
+        later = shift * (q - 1)
+        of_force, moved = np.array(force), np.array(answer)[:, :, q - 1]
+        records = [np.pad(v[..., : v.shape[-1] - later], [(0, 0)] * (v.ndim - 1) + [(later, 0)]) for v in (of_force, moved[:, 0])]
+        np.savez(tmp_path / f"hammer{q}.npz", fs=RATE, force=records[0], velocity1=records[1])
+    columns = 'columns = { force = "force [N]", velocity1 = "velocity 1 [m/s]" }'
+    of_each = "".join(f'[[files]]\nfile = "hammer{q}.npz"\ntest = "T20"\nreference = {q}\n{columns}\n' for q in (1, 2))
+    (tmp_path / "m.toml").write_text(MAPPING.replace('[[files]]\nfile = "hammer*"\ntest = "T20"\n', of_each) + "[records]\nband_Hz = [50.0, 1000.0]\n")
+    files = [tmp_path / "hammer1.npz", tmp_path / "hammer2.npz"]
+    if asked:
+        with pytest.raises(Unanswered, match="T20: hit_length_s: one length for all hits, so that one window, and the same lines, fit all its FRFs; at most "):
+            bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c")
+        return
+    bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    test = read_campaign(tmp_path / "c").tests[0]
+    model = exact(test.frf.frequency, test.window_decay)[0]
+    for q in range(2):
+        assert np.abs(test.frf.value[0, q] - model[q]).max() < 0.01 * np.abs(model[q]).max()
+
+
 def test_a_window_is_for_what_rings_and_not_for_noise():
     """A response that has died away to the noise of its sensor, 0.05 % of its peak, needs none; one that still rings does, as loud as that noise or three times softer, and so does a dead one with a short tail
     of which nobody can tell."""
