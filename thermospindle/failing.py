@@ -80,7 +80,7 @@ def behind(first: OperatingPoint, then: OperatingPoint, index: int, after: Mode)
     told = [f"{name} {value:+.2f} Hz" for name, value in moved if abs(value) > 5e-3]
     whole = after.frequency - mode.frequency
     rest = whole - sum(value for _, value in moved if abs(value) > 5e-3)
-    if abs(rest) > abs(whole) / 2:
+    if abs(rest) > max(abs(whole) / 2, 5e-3):
         return [*energy(first, index), "  moved too far for the elements' parts in it to be told to first order"]
     told += [f"all else {rest:+.2f} Hz"] if told and abs(rest) > 5e-3 else []
     return [*energy(first, index), *([f"  moved by the stiffness of: {', '.join(told)}"] if told else [])]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from thermospindle.diagnosis.compare.correlation import in_common, off_alone
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.runout.compare import RunoutBeside, compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import modal_tests
+from thermospindle.model.errors import listed
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM
 from thermospindle.report.progress import progress_bar
@@ -24,6 +26,8 @@ from thermospindle.report.verbs.answer import Answer, answered, check_out, with_
 from thermospindle.sim.campaign.beside import check_points, doubtful
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.campaign.likeness import likenesses
+
+SURE = 3.0  # standard errors
 
 
 def compare(
@@ -43,12 +47,13 @@ def compare(
     for s in filter(None, (spindle, earlier)):
         check_points(s, whole)  # before modes of minutes are found for nothing
     unseen = held_out(spindle, whole, held_out_tests)
+    own = replace(whole, spindle=spindle.name) if earlier is not None and earlier.name == whole.spindle else whole  # what effects were added to is that machine still
     turning = _of_runout(spindle, earlier, whole, unseen, verbose)
     tests = modal_tests(whole)
     if turning and not tests.tests:
         values = {"spindle": spindle.name, "campaign": whole.title, **turning[0]}
         alone = write_json("comparison.json", lambda folder: _write(None, spindle, folder, *turning[2:], whole.title, name=whole.name))
-        return answered(values, turning[1], out, asked, alone, doubtful(spindle, whole))
+        return answered(values, turning[1], out, asked, alone, doubtful(spindle, own))
     with progress_bar((3 if earlier else 2) * len(tests.tests)) as progress:
         observed = observe(tests, spindle, progress)
         comparison = beside(spindle, tests, observed, progress)
@@ -67,7 +72,7 @@ def compare(
             turning[1](console)
 
     write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ()), name=whole.name, both=both if earlier else None))
-    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *_beyond(comparison), *(likenesses(spindle, whole) or [*_louder(comparison), *_alone(comparison, whole)])])
+    return answered(values, show, out, asked, write, [*doubtful(spindle, own), *_beyond(comparison), *_by_law_of_damping(comparison), *(likenesses(spindle, whole) or [*_louder(comparison), *_alone(comparison, whole)])])
 
 
 def _beyond(c: Comparison) -> list[str]:
@@ -77,6 +82,19 @@ def _beyond(c: Comparison) -> list[str]:
         "is the temperature right, and in C?"
         for t in c.tests
         if t.beyond
+    ]
+
+
+def _by_law_of_damping(c: Comparison) -> list[str]:
+    """Modes damped so much that it matters whether loss grows with frequency: the pole i w sqrt(1 + 2 i z) of a complex stiffness is (1 + z^2) times as large as that of a damper of the same loss."""
+    high = [m for t in c.tests for m in t.modes if m.damping_computed**2 * m.computed > max(SURE * m.sd, -m.error / 2, m.error)]
+    higher = sorted({m.number for m in high if m.error < -0.3 * m.damping_computed**2 * m.computed})
+    if not higher:
+        return []
+    most = max(m.damping_computed for m in high if m.number in higher)
+    return [
+        f"mode{'s' * (len(higher) > 1)} {listed([str(n) for n in higher])}: {'is' if len(higher) == 1 else 'are'} damped by up to {100 * most:.2g} % of critical, and measured higher than computed: poles of hysteretic damping (a complex "
+        f"stiffness, as of rubber) lie up to {100 * most**2:.2g} % above those of viscous damping, which is computed here; diagnose finds which of the two the data have"
     ]
 
 

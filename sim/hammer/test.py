@@ -86,11 +86,11 @@ def impact_tests(
     if steps > MOST_STEPS:
         raise BadInput(
             f"{points[0].spindle.file or points[0].spindle.name}: the stiffest mode of the model asks for steps of {test.step * 1e6:.3g} us, {steps:.2g} of them a "
-            "record; shafts with beam = timoshenko or rayleigh, longer elements or a shorter record_length_s take fewer, and --element reduced needs none"
+            "record; shafts with beam = timoshenko or rayleigh, longer elements or a shorter record_length_s take fewer, and --element reduced (in Python element='reduced') needs none"
         )
     if element != REDUCED:
         for point in points:
-            check_step(point, test.step, "--element reduced (a hammer test without MuJoCo)")
+            check_step(point, test.step, "--element reduced (in Python element='reduced': a hammer test without MuJoCo)")
     results = []
     for batch in batched(enumerate(points), _at_once(test)):
         hits = [[draw_hits(test, np.random.default_rng([seed, i, node])) for node in test.hammer_nodes] for i, _ in batch]

@@ -16,7 +16,7 @@ from thermospindle.sim.importing.measured import Curve, listed
 FEWEST = 16  # lines of an FRF that is of use
 ADVICE = {
     "conjugated": "conjugate = true in its [[files]] turns it round",
-    "negative real part": "where the sensor looks the other way, say so where it is named, as in 3:-Z; the hammer's direction counts too",
+    "negative real part": "where the sensor looks the other way, say so where it is named, by the other sign of its axis, as 3:-Z for 3:+Z; the hammer's direction counts too",
     "another point than the hammer's": "tell in its [[files]] the point that the sensor was at",
     "an axis": "a column of frequencies is told as such in its [files.columns], with its unit",
     "coherence =": 'leave_out = ["H(response,reference)"] in its [[files]] does without it',

@@ -206,7 +206,7 @@ def test_other_units_than_the_scenes_are_doubted(tmp_path, unit, temperature, sp
     ("change", "said"),
     [
         (lambda v: v.conj(), r"T20.csv .*conjugated.*conjugate = true"),
-        (lambda v: -v, r"negative real part.*as in 3:-Z"),
+        (lambda v: -v, r"negative real part.*as 3:-Z for 3:\+Z"),
         (lambda v: v * 2j * np.pi * FREQUENCY, r"negative real part.*taken for accelerance its numbers pass: is its unit told as that of mobility by mistake"),
         (lambda v: v * np.where(np.arange(301) == 150, 0, 1), r"zero on 1 lines.*band_Hz"),
         (lambda v: v * np.array([[1, 3], [1, 1], [1, 1]])[:, :, None], r"reciprocity.*another unit, sign or node"),
@@ -224,7 +224,7 @@ def test_a_sign_that_looks_like_another_quantity_is_told_as_a_sign(tmp_path):
     """Minus an accelerance is a receptance's phase."""
     heads, found = columns("real", "(m/s^2)/N", -FRF.value * 2j * np.pi * FREQUENCY)
     file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
-    with pytest.raises(BadInput, match=r"looks the other way, say so where it is named, as in 3:-Z; .*; or, where the unit may be wrong, taken for receptance"):
+    with pytest.raises(BadInput, match=r"looks the other way, say so where it is named, by the other sign of its axis, as 3:-Z for 3:\+Z; .*; or, where the unit may be wrong, taken for receptance"):
         imported(tmp_path, "", file)
 
 
