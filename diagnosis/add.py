@@ -24,6 +24,8 @@ from thermospindle.sim.effects.own import OwnEffect
 if TYPE_CHECKING:
     from thermospindle.diagnosis.answer import Answer, Offered
 
+REJECTED = 1e-3  # probability, below which an answer takes an explanation for false
+
 
 @dataclass(frozen=True)
 class Added:
@@ -95,7 +97,7 @@ def new_scene(
         offered = offered_for(effects, answer, diagnosis)
         fitted = fitted_values(effects, offered, diagnosis)
         build, note = _build_of(effects, answer, offered, diagnosis, old, file)
-        note = "\n".join([*_with_others(effects, answer, offered, diagnosis), *([note] if note else []), *(_lawless(e, answer, diagnosis) for e in effects if e.name in offered.lawless)])
+        note = "\n".join([*_rejected(offered, answer, diagnosis), *_with_others(effects, answer, offered, diagnosis), *([note] if note else []), *(_lawless(e, answer, diagnosis) for e in effects if e.name in offered.lawless)])
     hand = _by_effect(effects, by_hand)
     added = tuple(_added(e, old, fitted.get(e.name, {}), hand[e.name], diagnosis) for e in effects)
     _write(file, effects, added, build, answer.tests if answer else (), f"fitted, from {diagnosis}", folder, out, catalogue)
@@ -216,6 +218,13 @@ def _lawless(effect: Effect, answer: Answer, diagnosis: Path) -> str:
     name, size = effect.name, effect.parameters[0].name
     drafts = f": spindle draft {diagnosis} --element {name} writes an effect with theirs" if name in answer.drafted else ""
     return f"the data have another law than {name} assumes, and {size} is one for all tests with the law assumed{drafts}"
+
+
+def _rejected(offered: Offered, answer: Answer, diagnosis: Path) -> list[str]:
+    """A sentence where the answer takes the explanation that values are of for false."""
+    if offered.probability >= REJECTED or set(offered.effects) <= set(answer.best):
+        return []
+    return [f"{diagnosis} gives {' + '.join(offered.effects)} a probability of {offered.probability:.1g}: by these data it is not what is missing, and its values explain nothing"]
 
 
 def _with_others(effects: Sequence[Effect], answer: Answer, offered: Offered, diagnosis: Path) -> list[str]:

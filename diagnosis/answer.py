@@ -20,11 +20,12 @@ OF_TEST, OF_CHANNEL = "temperature of ", "gain of channel "  # not the spindle's
 
 @dataclass(frozen=True)
 class Offered:
-    """A candidate: its effects, their parameters, and those of which the data have another law than they assume."""
+    """A candidate: its effects, their parameters, those of which the data have another law than they assume, and its probability (1 in an answer without any)."""
 
     effects: tuple[str, ...]
     parameters: Mapping[str, Any]
     lawless: frozenset[str] = frozenset()
+    probability: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def answer_of(raw: Any, where: str) -> Answer:
 
 def _offered(raw: Any) -> Offered:
     departing = {_text(name) for name, departure in raw.get("departure_from_law", {}).items() if _finite(departure) >= DEPARTS}
-    return Offered(tuple(map(_text, raw["effects"])), dict(raw["parameters"]), frozenset(departing | set(map(_text, raw.get("own_law", ())))))
+    return Offered(tuple(map(_text, raw["effects"])), dict(raw["parameters"]), frozenset(departing | set(map(_text, raw.get("own_law", ())))), _finite(raw.get("probability", 1.0)))
 
 
 def _text(value: Any) -> str:

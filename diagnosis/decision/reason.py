@@ -27,9 +27,9 @@ LEFT = "what is left"  # that changes, and tells of something else
 OFF, NAMED = 2.0, 4  # stated standard deviations from which a tolerance is said to be off, and how many of these are named
 LITTLE_OF_THE_WAY = 0.1  # of which nothing is said
 CONVENTIONS = {
-    (kinds_of.LAW, 0): "what loss factors lose is the same at all frequencies, as of a complex stiffness, where the model has dampers",
-    (kinds_of.LAW, 1): "what dampers lose is nearly the same at all frequencies",
-    (kinds_of.ORBITS, 0): "balls orbit each as fast as it rolls, where the model has them go with their cage",
+    (kinds_of.LAW, 0): "loss factors act as hysteretic damping (a complex stiffness, the same loss at all frequencies), where the model has viscous dampers",
+    (kinds_of.LAW, 1): "damping ratios act as hysteretic damping does, nearly the same at all frequencies",
+    (kinds_of.ORBITS, 0): "every ball orbits at its own speed, where the model has one cage speed for a row",
 }
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 
@@ -44,7 +44,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         constant = f", the model's frequencies being constantly wrong by about {100 * wrong:.1g} % of each{which}" if wrong > NUMERICS[0] else ""
         otherwise = f", what speed does to the balls' stiffness being wrong by about {change:.0%} of it, and what temperature does by a little" if change else ""
         otherwise += f", what temperature and speed do to each mode being wrong by about {misjudged:.0%} of it" if misjudged else ""
-        return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{otherwise}{best}."
+        return f"Tolerances and measuring errors explain the data: reduced chi-square {chi2 / n:.2f} of {n} data{constant}{otherwise}{best}."
     lead = candidates[0] if candidates else None
     if word == "unexplained":
         place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
@@ -61,7 +61,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         elif free and free[0].hypothesis.mechanisms:
             h = free[0].hypothesis
             forms = [f"what {m.name} does" if m.beyond else m.name for m in h.mechanisms if m.free]
-            beyond = ", by sizes that it cannot have" if any(m.beyond for m in h.mechanisms) else ""
+            beyond = ", beyond its physical limits" if any(m.beyond for m in h.mechanisms) else ""
             drift = "differ from the drawing, by as much in every test" if _same_in_all(h) else "drift"
             beside = f" beside {' and '.join(named_part(free[0]))}" if named_part(free[0]) else ""
             place = f"{' and '.join(forms)} would have to {drift}{beyond}{beside} ({free[0].delta_evidence:.0f} in ln evidence)"
@@ -71,18 +71,18 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             place = f"tolerances and measuring errors would, with {listed(off)}, but nothing is built so: the sense of rotation, units, points and the drawing come first"
         elif free and free[0].names != (UNTOLD,):
             by = " and ".join(f"by {size:.1g} of its {what}" for size, what in drifts(found.model, found.base))
-            place = f"every mode drifts from test to test, {by}, more than two honest programs differ by"
+            place = f"every mode drifts from test to test, {by}, more than numerical differences between programs"
         if not free or free[0].names in ((UNTOLD,), (UNBUILT,)):
-            return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
+            return f"No effect of the catalogue explains the data: {place} (reduced chi-square without effects: {chi2 / n:.2f})."
         rival = f"; the best of the catalogue, {' + '.join(lead.names)}, gains {lead.delta_evidence:z.0f} in ln evidence" if lead else ""
         no_better = not lead or free[0].delta_evidence >= lead.delta_evidence
         says = "No effect of the catalogue explains the data as well as free drift does" if no_better else "No effect of the catalogue is probable enough beside free drift"
-        return f"{says}: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
+        return f"{says}: {place}{rival} (reduced chi-square without effects: {chi2 / n:.2f})."
     named = " + ".join(effects)
     checked = ""
     if np.isfinite(after):
-        how = "" if after < HARDLY * before else ", but missed nearly as far: its law is hardly theirs" if after < before else ", for it is less sure of them"
-        checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors, {gain:+z.0f} in ln probability density{how}"
+        how = "" if after < HARDLY * before else ", but missed nearly as far: its law hardly holds there" if after < before else ", for it is less sure of them"
+        checked = f"; conditions left out (cross-validation) are predicted to {after:.2f} instead of {before:.2f} standard errors, {gain:+z.0f} in ln predictive density{how}"
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]
         share = sum(c.probability for c in rows)
@@ -107,7 +107,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     disagreement = ", which does not confirm it" if checked and gain < LITTLE else ""
     before_own = f", {chosen.by_law.evidence.ln - found.base.evidence.ln:.0f} with the law assumed" if chosen.by_law else ""
     whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
-    law = f" with a law of the data's own{whose}{before_own}" if own else ""
+    law = f" with a law that is fitted freely{whose}{before_own}" if own else ""
     return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}{disagreement}."
 
 
@@ -121,7 +121,7 @@ def _impossible(found: Search, drifting: Names) -> str:
     """The effects that change what drifts, but would need sizes that they cannot have."""
     same = set().union(*(found.alike.get(name, ()) for name in drifting))
     cannot = sorted({h.names[0] for h in found.hypotheses if len(h.names) == 1 and h.names[0] in same and beyond_limits(h)})
-    return f", which {' or '.join(cannot)} would do at a size that it cannot have" if cannot else ""
+    return f", which {' or '.join(cannot)} would do at a size beyond its physical limits" if cannot else ""
 
 
 def of_resonances(model: CampaignModel, best: Hypothesis) -> str:

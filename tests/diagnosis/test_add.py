@@ -91,6 +91,9 @@ def test_one_effect_has_the_values_that_it_has_alone(add, tmp_path):
     first = add("first", "preload_loss", found=answer(["preload_loss"]) | {"candidates": [alone, pair]})
     assert (first["added"][0]["values"]["loss"], first["build"]) == (0.35, TOLERANCES)
     assert "values are those" not in first["note"]
+    refused = add("refused", "preload_loss", found=answer(["added_disk"]) | {"candidates": [{"effects": ["added_disk"], "parameters": {}}, alone | {"probability": 5e-68}]})
+    assert "gives preload_loss a probability of 5e-68: by these data it is not what is missing" in refused["note"]
+    assert "probability" not in first["note"]
 
 
 def test_one_after_the_other_is_the_pair(add, tmp_path):

@@ -179,7 +179,7 @@ def test_an_effect_is_named_whatever_its_law(case):
     assert (v.word, set(v.effects)) == (word, effects)
     assert v.candidates[0].own_laws == own
     assert len({frozenset(c.names) for c in v.candidates}) == len(v.candidates)
-    assert ("with a law of the data's own" in v.reason) == (bool(own) and word in ("identified", "two effects"))
+    assert ("with a law that is fitted freely" in v.reason) == (bool(own) and word in ("identified", "two effects"))
     assert total(v) == pytest.approx(1.0, abs=1e-9)
 
 
@@ -194,7 +194,7 @@ def test_a_size_that_cannot_be_is_no_law_of_its_own():
     assert decide(found).word == "identified"
     v = decide(replace(found, hypotheses=negative, alike={"~x": frozenset({"a", "b"})}))
     assert v.word == "unexplained"
-    assert "which a would do at a size that it cannot have" in v.reason
+    assert "which a would do at a size beyond its physical limits" in v.reason
 
 
 @pytest.mark.parametrize(("sizes", "word"), [((-3.0, -4.0), "none"), ((-3.0, 4.0), "identified"), ((-0.1, -0.1), "identified"), ((3.0, 4.0), "identified")])
@@ -309,7 +309,7 @@ def test_what_does_what_an_effect_cannot_is_something_unknown(best, word):
     assert v.word == word
     assert total(v) == pytest.approx(1.0)
     if word == "unexplained":
-        assert "what a does would have to drift, by sizes that it cannot have (99 in ln evidence); the best of the catalogue, b, gains 60 in ln evidence" in v.reason  # 1.5 times as much
+        assert "what a does would have to drift, beyond its physical limits (99 in ln evidence); the best of the catalogue, b, gains 60 in ln evidence" in v.reason  # 1.5 times as much
 
 
 def test_an_effect_and_what_does_what_it_cannot_are_two():

@@ -263,8 +263,8 @@ def test_what_other_programs_do_otherwise_is_said():
 
     assert told((0.05, -1.0, 0.5)) == ""
     assert told((0.98, 0.2, 1.1)) == (
-        " Taken into account: what loss factors lose is the same at all frequencies, as of a complex stiffness, where the model has dampers (0.98 +- 0.02 of the way from one to the other); "
-        "balls orbit each as fast as it rolls, where the model has them go with their cage (1.10 +- 0.2 of the way from one to the other)."
+        " Taken into account: loss factors act as hysteretic damping (a complex stiffness, the same loss at all frequencies), where the model has viscous dampers (0.98 +- 0.02 of the way from one to the other); "
+        "every ball orbits at its own speed, where the model has one cage speed for a row (1.10 +- 0.2 of the way from one to the other)."
     )
 
 
