@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.linear import Linear, Pairs, Rates, change_between, pairs, same_chain, together
+from thermospindle.diagnosis.forward.linear import BY_LAW, DAMPERS, Linear, Pairs, Rates, change_between, pairs, same_chain, together
 from thermospindle.diagnosis.forward.measuring import aside, askew, hammer_gain
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.points import Applied
@@ -133,7 +133,7 @@ def _after_each_other(every: Sequence[Shared]) -> Shared:
 
 
 def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) -> list[tuple[Array, int, Pairs, Shared]]:
-    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), a power of s, pairs of vectors, and the parameters that they are of."""
+    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), a power of s or what stands in its place, pairs of vectors, and the parameters that they are of."""
     w, ((number, i, j, stiffness), (lossy, a, b, damping)) = model.reference.over(linear.matrices.dofs), model.numbers.discrepancies[t]
     modes = w.shape[1]
     _, first, of = np.unique(i * modes + j, return_index=True, return_inverse=True)
@@ -142,7 +142,7 @@ def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) ->
     turned = [(i, modes + np.arange(k)), (j, modes + k + np.arange(k))]
     halved = damping * np.where(a == b, 0.5, 1.0)
     _, first, of_damping = np.unique(a * modes + b, return_index=True, return_inverse=True)
-    return [(np.hstack([w, beside]), 0, turned, (number, of, stiffness)), (w, 1, [(a[first], b[first])], (lossy, of_damping, halved))]
+    return [(np.hstack([w, beside]), 0, turned, (number, of, stiffness)), (w, BY_LAW + DAMPERS if linear.damped_by_law else 1, [(a[first], b[first])], (lossy, of_damping, halved))]
 
 
 def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:

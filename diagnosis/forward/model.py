@@ -14,7 +14,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward.latest import Latest
-from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_changes
+from thermospindle.diagnosis.forward.linear import DAMPERS, Dofs, Linear, mass_changes
 from thermospindle.diagnosis.forward.measuring import channel_gain, measured, replace_measuring
 from thermospindle.diagnosis.forward.points import Applied, undrawn
 from thermospindle.diagnosis.forward.response import Law, Light, Response
@@ -182,7 +182,8 @@ class CampaignModel:
         stiffness, damping = self._discrepancy(t, m, x)
         mass, gyroscopic = self._otherwise_heavy(x, m.dofs)
         whole = Matrices(m.mass + mass, m.damping + damping + point.chain.speed * gyroscopic, m.stiffness + stiffness, m.dofs)
-        return replace(bare, matrices=whole, chain=measured(self.numbers, t, point, x), between=self._between(point))
+        lost = np.array([*(bare.lost[:DAMPERS]), bare.lost[DAMPERS] + damping]) if bare.lost is not None and bare.damped_by_law else bare.lost
+        return replace(bare, matrices=whole, chain=measured(self.numbers, t, point, x), between=self._between(point), lost=lost)
 
     def _between(self, point: OperatingPoint) -> Between | None:
         if self.lumped:

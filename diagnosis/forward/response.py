@@ -247,7 +247,7 @@ class Response:
                 np.sum(read[i][:, :, None] * driven[j][:, None], axis=0, out=of_it)
             if (end := self._late) is not None:
                 i, j = first[few].ravel(), second[few].ravel()
-                kicked = end.kicked(columns[:, i], columns[:, j], np.full(len(i), power))
+                kicked = end.kicked(columns[:, i], columns[:, j], np.full(len(i), 1 if power > BY_LAW else power))
                 found += self._cut * end.moved(np.add.reduceat(kicked, np.arange(0, len(i), first.shape[1]), axis=0))
             yield found
 

@@ -85,8 +85,9 @@ def test_two_tests_are_enough_for_an_answer():
     scene = SCENES["symmetric"]
     hidden = [(effect("preload_loss"), WITH_TEMPERATURE)]
     campaign = virtual_campaign(scene, TESTS[::2], 1, hidden, drawn(scene, 2, 1), responses=(1, 3, 6), frequency=FREQUENCY)
-    found = checked(diagnose(scene, campaign))
-    assert found.verdict.word != "identified" or found.verdict.effects == ("preload_loss",)
+    v = checked(diagnose(scene, campaign)).verdict
+    assert "preload_loss" in v.effects
+    assert v.effects == ("preload_loss",) or v.word == "ambiguous"
 
 
 @pytest.mark.slow
@@ -96,6 +97,8 @@ def test_mode_tables_are_enough_for_an_answer(name, hidden):
     scene = SCENES[name]
     effects = [(effect("preload_loss"), WITH_TEMPERATURE)] if hidden else []
     v = checked(diagnose(scene, mode_campaign(scene, TESTS, 1, effects, errors=drawn(scene, 3, 1)))).verdict
-    assert v.word != "identified" or (hidden and v.effects == ("preload_loss",))
-    if not hidden:
+    if hidden:
+        assert "preload_loss" in v.effects
+        assert v.effects == ("preload_loss",) or v.word == "ambiguous"
+    else:
         assert v.word == "none"
