@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.linear import BY_LAW, DAMPERS, Linear, Pairs, Rates, change_between, pairs, same_chain, together
+from thermospindle.diagnosis.forward.linear import BY_LAW, Linear, Pairs, Rates, change_between, pairs, same_chain, together
 from thermospindle.diagnosis.forward.measuring import aside, askew, hammer_gain
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.points import Applied
@@ -61,7 +61,7 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     discrepancies = _by_discrepancies(model, t, linear, x)
     shared = [_each(rates.numbers[t]), *(of for *_, of in discrepancies)]
     if isinstance(response, Table):
-        r, found = response.residual, response.moved(together([rates.products[t], *(pairs(vectors, power, of) for vectors, power, of, _ in discrepancies)]))
+        r, found = response.residual, response.moved(together([rates.products[t], *(pairs(vectors, int(power[0]), of) for vectors, power, of, _ in discrepancies)]))
         return r, Derivatives(np.concatenate([found, np.zeros((more, len(r)))]), *_after_each_other(shared))
     assert isinstance(data, LineData)
     record = [] if model.numbers.record is None else [model.numbers.record]
@@ -132,8 +132,8 @@ def _after_each_other(every: Sequence[Shared]) -> Shared:
     return np.concatenate(numbers), np.concatenate([rows + n for rows, n in zip(of, first, strict=False)]), np.concatenate(times)
 
 
-def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) -> list[tuple[Array, int, Pairs, Shared]]:
-    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), a power of s or what stands in its place, pairs of vectors, and the parameters that they are of."""
+def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) -> list[tuple[Array, Integers, Pairs, Shared]]:
+    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), the power of s of each (m,) or what stands in its place, pairs of vectors, and the parameters that they are of."""
     w, ((number, i, j, stiffness), (lossy, a, b, damping)) = model.reference.over(linear.matrices.dofs), model.numbers.discrepancies[t]
     modes = w.shape[1]
     _, first, of = np.unique(i * modes + j, return_index=True, return_inverse=True)
@@ -142,7 +142,15 @@ def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) ->
     turned = [(i, modes + np.arange(k)), (j, modes + k + np.arange(k))]
     halved = damping * np.where(a == b, 0.5, 1.0)
     _, first, of_damping = np.unique(a * modes + b, return_index=True, return_inverse=True)
-    return [(np.hstack([w, beside]), 0, turned, (number, of, stiffness)), (w, BY_LAW + DAMPERS if linear.damped_by_law else 1, [(a[first], b[first])], (lossy, of_damping, halved))]
+    parts: list[tuple[Array, int]] = [(w, 1)]
+    if linear.lost is not None:  # the shares of loss factors, as complex stiffness and as dampers, and of dampers
+        share = model.by_factors
+        every = (share, w * np.sqrt(model.reference.omega), BY_LAW), (share, w, BY_LAW + 1), (1 - share, w, BY_LAW + 2)
+        parts = [(np.sqrt(part) * vectors, power) for part, vectors, power in every if part > 0]
+    lost, powers = np.hstack([vectors for vectors, _ in parts]), np.repeat([power for _, power in parts], modes)
+    pairs_of = [(n * modes + a[first], n * modes + b[first]) for n in range(len(parts))]
+    stiff = np.hstack([w, beside])
+    return [(stiff, np.zeros(stiff.shape[1], int), turned, (number, of, stiffness)), (lost, powers, pairs_of, (lossy, of_damping, halved))]
 
 
 def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:

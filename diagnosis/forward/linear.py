@@ -23,7 +23,6 @@ Pairs = Sequence[tuple[Integers, Integers]]
 
 CHAIN = ("response_rows", "reference_rows", "gain", "delay", "decay")
 BY_LAW = 3  # and on: what stands in place of a power of s, of what a law of damping is about
-DAMPERS = 2  # of `Linear.lost`
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
 
 
@@ -37,11 +36,6 @@ class Linear:
     layout: tuple
     between: Between | None = None
     lost: Array | None = None
-
-    @property
-    def damped_by_law(self) -> bool:
-        """Whether dampers alone lose energy, and lines are measured: what their modes lose otherwise than drawn has the law of the dampers then."""
-        return self.lost is not None and bool(self.lost[DAMPERS].any()) and not self.lost[:DAMPERS].any()
 
     def moved(self, first: Linear, second: Linear, times: float) -> Linear:
         """With `times` the difference of two others added, in all that may differ; the same where these have other degrees of freedom."""

@@ -14,7 +14,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward.latest import Latest
-from thermospindle.diagnosis.forward.linear import DAMPERS, Dofs, Linear, mass_changes
+from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_changes
 from thermospindle.diagnosis.forward.measuring import channel_gain, measured, replace_measuring
 from thermospindle.diagnosis.forward.points import Applied, undrawn
 from thermospindle.diagnosis.forward.response import Law, Light, Response
@@ -182,7 +182,7 @@ class CampaignModel:
         stiffness, damping = self._discrepancy(t, m, x)
         mass, gyroscopic = self._otherwise_heavy(x, m.dofs)
         whole = Matrices(m.mass + mass, m.damping + damping + point.chain.speed * gyroscopic, m.stiffness + stiffness, m.dofs)
-        lost = np.array([*(bare.lost[:DAMPERS]), bare.lost[DAMPERS] + damping]) if bare.lost is not None and bare.damped_by_law else bare.lost
+        lost = None if bare.lost is None else bare.lost + self._lost_otherwise(t, m.dofs, x, damping)
         return replace(bare, matrices=whole, chain=measured(self.numbers, t, point, x), between=self._between(point), lost=lost)
 
     def _between(self, point: OperatingPoint) -> Between | None:
@@ -222,6 +222,21 @@ class CampaignModel:
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w, (_, damping) = self.reference.over(linear.dofs), self.numbers.discrepancies[t]
         return w @ self.turned(t, x).whole @ w.T, w @ _modal(damping, x, len(self.reference.omega)) @ w.T
+
+    def _lost_otherwise(self, t: int, dofs: Dofs, x: Array, damping: Array) -> Array:
+        """What of `Linear.lost` (3, n, n) the discrepancy of the `damping` (n, n) is: it has the laws of loss factors and of dampers, in the shares that these have in what modes lose."""
+        share, w = self.by_factors, self.reference.over(dofs) * np.sqrt(self.reference.omega)
+        constant = share * w @ _modal(self.numbers.discrepancies[t][1], x, len(self.reference.omega)) @ w.T if share else np.zeros_like(damping)
+        return np.array([constant, share * damping, (1 - share) * damping])
+
+    @cached_property
+    def by_factors(self) -> float:
+        """Share of loss factors in what the reference modes lose, the rest being the dampers'."""
+        chain = operating_point(self.spindle, Condition(self.spindle.reference_temperature), self.present).chain
+        own = matrices(chain)
+        shape = np.linalg.solve(own.mass, self.reference.over(own.dofs))
+        factors, dampers = (float(np.sum(np.einsum("im,ij,jm->m", shape, lost, shape) / self.reference.omega)) for lost in losses(chain, own)[1:])
+        return factors / (factors + dampers) if factors > 0 else 0.0
 
     def turned(self, t: int, x: Array) -> Turned:
         """What test `t` has of a stiffness between modes otherwise than the model."""

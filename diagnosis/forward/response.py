@@ -235,10 +235,10 @@ class Response:
             found += _over(right[:, power == p] @ left[:, power == p].T, self._forced(int(p)))
         return found
 
-    def moved_together(self, columns: Array, power: int, of: Pairs) -> Iterator[ComplexArray]:
-        """Derivatives (k, n_resp, n_ref, L) by factors of s^`power` times the sum over pairs i, j `of` each of u_i u_j^T + u_j u_i^T in the dynamic stiffness, u the `columns` (r, m):
+    def moved_together(self, columns: Array, power: Integers, of: Pairs) -> Iterator[ComplexArray]:
+        """Derivatives (k, n_resp, n_ref, L) by factors of the sum over pairs i, j `of` each of s^`power`_i (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m), of equal power (m,) in a pair:
         a few at a time, for they fill memory rather than a cache."""
-        read, driven = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
+        read, driven = self.read(columns), self.driven(columns, power)
         first, second = (np.stack(numbers, axis=1) for numbers in zip(*(pair for i, j in of for pair in ((i, j), (j, i))), strict=True))
         for at in range(0, len(first), TOGETHER):
             few = slice(at, at + TOGETHER)
@@ -247,7 +247,8 @@ class Response:
                 np.sum(read[i][:, :, None] * driven[j][:, None], axis=0, out=of_it)
             if (end := self._late) is not None:
                 i, j = first[few].ravel(), second[few].ravel()
-                kicked = end.kicked(columns[:, i], columns[:, j], np.full(len(i), 1 if power > BY_LAW else power))
+                ended = np.select([power[i] > BY_LAW, power[i] == BY_LAW], [1, 0], power[i])  # as dampers have it
+                kicked = end.kicked(np.where(power[i] == BY_LAW, 0.0, columns[:, i]), columns[:, j], ended)
                 found += self._cut * end.moved(np.add.reduceat(kicked, np.arange(0, len(i), first.shape[1]), axis=0))
             yield found
 

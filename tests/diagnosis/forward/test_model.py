@@ -43,9 +43,35 @@ def test_derivatives_of_lines_beside_loss_factors(scene):
     joints = tuple(replace(j, damping_ratio=0.0, loss_factor=0.04) for j in scene.structure.joints)
     model, x = made(replace(scene, structure=replace(scene.structure, joints=joints)))
     x[model.numbers.law[0]] = 0.5, -0.4
+    assert 0.1 < model.by_factors < 0.9
     worst = worst_by_kind(model, 1, x)
     assert worst[kinds_of.LAW] < 1e-4
+    assert worst[kinds_of.DAMPING] < 1e-4
     assert worst[kinds_of.BUILD] < 5e-3
+
+
+def test_what_modes_lose_otherwise_is_at_their_own_frequency_what_it_is(scene):
+    """Where loss factors alone lose, whatever their law: at other frequencies a complex stiffness loses as much, and a damper in proportion."""
+    joints = tuple(replace(j, damping_ratio=0.0, loss_factor=0.04) for j in scene.structure.joints)
+    bearings = tuple(replace(b, damping_ratio=0.0) for b in scene.bearings)
+    model, x = made(replace(scene, structure=replace(scene.structure, joints=joints), bearings=bearings))
+    x[:] = 0.0
+    assert model.by_factors == pytest.approx(1.0, abs=1e-9)
+    modes, number = model.reference, {model.numbers.discrepancies[0][1][1][k]: n for k, n in enumerate(model.numbers.discrepancies[0][1][0]) if model.numbers.discrepancies[0][1][1][k] == model.numbers.discrepancies[0][1][2][k]}
+    for mode, parameter in list(number.items())[:5]:
+        off = x.copy()
+        off[parameter] = 1.0
+        changes = []
+        for law in (0.0, 1.0):
+            off[model.numbers.law[0][0]] = law
+            at = 1j * modes.omega[mode] * np.array([1.0, 2.0])
+            lost = model.linear(0, off, []).lost - model.bare(0, off, []).lost
+            shape = np.linalg.solve(model.bare(0, off, []).matrices.mass, modes.over(model.bare(0, off, []).matrices.dofs))[:, mode]
+            changes.append(sum(f * (shape @ m @ shape) for f, m in zip(model.law(off).whole(at), lost, strict=True)))
+        dampers, constant = changes
+        assert constant[0] == pytest.approx(dampers[0], rel=1e-9)
+        assert constant[1] == pytest.approx(constant[0], rel=1e-9)
+        assert dampers[1] == pytest.approx(2 * dampers[0], rel=1e-9)
 
 
 def test_what_dampers_lose_otherwise_costs_no_product_more(scene):

@@ -62,7 +62,7 @@ def test_derivatives_of_records_that_end_early(scene):
         by_pair = [np.outer(vectors[:, a], vectors[:, b]) + np.outer(vectors[:, b], vectors[:, a]) for a, b in zip(i, j, strict=True)]
         zero = np.zeros((n, n))
         power = {"mass": 2, "damping": 1, "stiffness": 0}[which]
-        at_once = np.concatenate(list(at(1.0, 0.0).moved_together(vectors, power, [(i, j)])))
+        at_once = np.concatenate(list(at(1.0, 0.0).moved_together(vectors, np.full(4, power), [(i, j)])))
         by_each = [products(*[pair if k == which else zero for k in ("mass", "damping", "stiffness")]) for pair in by_pair]
         apart = at(1.0, 0.0).moved(together(by_each))
         assert np.abs(at_once - apart).max() < 1e-9 * np.abs(apart).max()
