@@ -77,17 +77,18 @@ class Products:
     the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first; a power from `BY_LAW` on stands for
     what a law of damping has in its place (`response.Law.whole`)."""
 
-    @cached_property
-    def of_dampers(self) -> Products:
-        """With dampers for all that is lost: what a law of damping adds to them is left out, and s stands where it may have something else."""
-        return replace(self, power=np.select([self.power > BY_LAW, self.power == BY_LAW], [1, 0], self.power), left=np.where(self.power == BY_LAW, 0.0, self.left))
-
     count: int
     of: Integers
     first: Integers
     power: Integers
     left: Array
     right: Array
+
+    @cached_property
+    def of_dampers(self) -> Products:
+        """With dampers for all that is lost: what a law of damping adds to them is left out, and s stands where it may have something else."""
+        left, power = as_dampers(self.left, self.power)
+        return replace(self, power=power, left=left)
 
 
 def products(mass: Array, damping: Array, stiffness: Array, lost: Array | None = None) -> Products:
@@ -109,6 +110,11 @@ def products(mass: Array, damping: Array, stiffness: Array, lost: Array | None =
             left[-1][rows], right[-1][columns] = u[:, kept] * size[kept], v[kept].T
     moves = np.zeros(min(len(power), 1), int)
     return Products(1, moves, moves, np.array(power, int), np.concatenate(left, axis=1), np.concatenate(right, axis=1))
+
+
+def as_dampers(left: Array, power: Integers) -> tuple[Array, Integers]:
+    """Left vectors (n, m) and powers of s (m,) of products with dampers for all that is lost: what a law of damping adds to them is nothing, and s stands where it may have something else."""
+    return np.where(power == BY_LAW, 0.0, left), np.select([power > BY_LAW, power == BY_LAW], [1, 0], power)
 
 
 def pairs(vectors: Array, power: int, of: Pairs) -> Products:

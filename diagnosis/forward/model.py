@@ -28,7 +28,7 @@ from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.rotor.chain import Matrices, losses, matrices
+from thermospindle.model.rotor.chain import Matrices, RotorBase, losses, matrices
 from thermospindle.model.rotor.modes import Between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Values
@@ -146,10 +146,15 @@ class CampaignModel:
         return Latest(4 * KEPT * len(self.tests))
 
     @cached_property
+    def _at_reference(self) -> RotorBase:
+        """The chain of the spindle as drawn at the reference condition."""
+        return operating_point(self.spindle, Condition(self.spindle.reference_temperature), self.present).chain
+
+    @cached_property
     def by_condition(self) -> Array:
         """Relative changes (tests, 2, modes) that temperature and speed make in the frequency and the damping of the modes seen, from the reference condition, of the spindle as drawn; none of
         one that cannot be built."""
-        reference = matrices(operating_point(self.spindle, Condition(self.spindle.reference_temperature), self.present).chain)
+        reference = matrices(self._at_reference)
         found = np.zeros((len(self.tests), 2, self.reference.seen))
         for t in range(len(self.tests)):
             try:
@@ -232,8 +237,7 @@ class CampaignModel:
     @cached_property
     def by_factors(self) -> float:
         """Share of loss factors in what the reference modes lose, the rest being the dampers'."""
-        chain = operating_point(self.spindle, Condition(self.spindle.reference_temperature), self.present).chain
-        own = matrices(chain)
+        chain, own = self._at_reference, matrices(self._at_reference)
         shape = np.linalg.solve(own.mass, self.reference.over(own.dofs))
         factors, dampers = (float(np.sum(np.einsum("im,ij,jm->m", shape, lost, shape) / self.reference.omega)) for lost in losses(chain, own)[1:])
         return factors / (factors + dampers) if factors > 0 else 0.0

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.linear import BY_LAW, Linear, Pairs, Products
+from thermospindle.diagnosis.forward.linear import BY_LAW, Linear, Pairs, Products, as_dampers
 from thermospindle.diagnosis.forward.record import RecordEnd
 from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.rotor.modes import LARGE, Poles, poles
@@ -247,8 +247,8 @@ class Response:
                 np.sum(read[i][:, :, None] * driven[j][:, None], axis=0, out=of_it)
             if (end := self._late) is not None:
                 i, j = first[few].ravel(), second[few].ravel()
-                ended = np.select([power[i] > BY_LAW, power[i] == BY_LAW], [1, 0], power[i])  # as dampers have it
-                kicked = end.kicked(np.where(power[i] == BY_LAW, 0.0, columns[:, i]), columns[:, j], ended)
+                left, ended = as_dampers(columns[:, i], power[i])  # records end as dampers have it
+                kicked = end.kicked(left, columns[:, j], ended)
                 found += self._cut * end.moved(np.add.reduceat(kicked, np.arange(0, len(i), first.shape[1]), axis=0))
             yield found
 

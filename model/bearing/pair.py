@@ -214,11 +214,11 @@ def _many_positions(spindle: Spindle, rows: Mapping[str, BallRow], rotor: Rotor,
 
     A spindle is preloaded as it is put together: at the reference every row has its preload, joints hold what that asks of them, and from there on they give.
     """
-    names, held = list(rows), _held_by(spindle, rotor)
-    motion = np.array([[(rotor.of[n][1] == c) - (rotor.of[n][0] == c) for c in held.parts] for n in names], float)
-    at_reference = np.array([spindle.bearing(n).sense * spindle.bearing(n).preload if n in held.preloaded else 0.0 for n in names])
+    names, tied = list(rows), _tied_by(spindle, rotor)
+    motion = np.array([[(rotor.of[n][1] == c) - (rotor.of[n][0] == c) for c in tied.parts] for n in names], float)
+    at_reference = np.array([spindle.bearing(n).sense * spindle.bearing(n).preload if n in tied.preloaded else 0.0 for n in names])
     sleeves = tuple((tuple(names.index(n) for n in ring_of), push, rate) for ring_of, push, rate in rotor.springs)
-    parts = Parts(tuple(rows.values()), motion, at_reference, sleeves, held.stiffness, _loaded_part(spindle, rotor, held.parts))
+    parts = Parts(tuple(rows.values()), motion, at_reference, sleeves, tied.stiffness, _loaded_part(spindle, rotor, tied.parts))
     try:
         return dict(zip(names, balanced(parts, centres).tolist(), strict=True))
     except NoEquilibrium as error:
@@ -226,7 +226,7 @@ def _many_positions(spindle: Spindle, rows: Mapping[str, BallRow], rotor: Rotor,
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class Tied:
     """What holds the carriers of one rotor's rings along the axis: the `parts` (n,) that may move, these carriers and what joints tie them to, with the `stiffness` (n, n) of the joints between them
     and to the ground; and the rows that are `preloaded` against each other through carriers that joints tie together, or from outside."""
 
@@ -235,7 +235,7 @@ class Held:
     preloaded: frozenset[str]
 
 
-def _held_by(spindle: Spindle, rotor: Rotor) -> Held:
+def _tied_by(spindle: Spindle, rotor: Rotor) -> Tied:
     structure = spindle.structure
     carried = [(structure.carrier(j.bodies[0]), structure.carrier(j.bodies[1]), j.stiffness[2]) for j in structure.own_joints]
     ties = [(a, b, k) for a, b, k in carried if k > 0 and a != b]
@@ -257,7 +257,7 @@ def _held_by(spindle: Spindle, rotor: Rotor) -> Held:
         return frozenset(frozenset(group[c]) for c in rotor.of[name])
 
     rigid = [s for s in rotor.sets if spindle.one_way(s) or len({between(name) for name in s.bearings}) == 1]
-    return Held(parts, stiffness, frozenset(name for s in rigid for name in s.bearings))
+    return Tied(parts, stiffness, frozenset(name for s in rigid for name in s.bearings))
 
 
 def _loaded_part(spindle: Spindle, rotor: Rotor, parts: Sequence[str]) -> Array:
