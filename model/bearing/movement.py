@@ -1,201 +1,191 @@
-"""How far rings move until their axial forces balance."""
+"""How far rings move until their axial forces balance.
+
+Unknown are the axial movements of what carries rings and is rigid in itself, and of rings that slide on springs; the balance of the axial forces on each gives the
+equations. A spindle is preloaded as it is put together: at the reference every row has its preload, springs have theirs, joints hold what that asks of them, and
+from there on all give.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-import scipy
 
 from thermospindle.model.bearing.ball_row import BallRow
-from thermospindle.model.bearing.centred import Centres, centred_axial, centred_axial_force
+from thermospindle.model.bearing.centred import Centres, centred_axial
 from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.machine import Bearing, Spindle, kept
 from thermospindle.model.types import Array
 
-MOST, LEAST = 100, 1e-6  # steps of many parts, and how short they get
-STEPS = 20  # of Newton's method, which takes six
-FARTHEST = 1e-4  # m, in one of them
+MOST = 100  # steps
+FARTHEST, REACH = 1e-4, 5e-3  # m, in one of them at first, and at all
+STEEP = 0.5  # of the slope along a step, at most where it ends
 EXACT, ROUNDED = 1e-17, 1e-15  # m, of what is left of a step, and below which a step that does not get shorter is rounding
-REACH, NEAR = 1e-6, 1e-9  # m, first bracket about where nothing has moved, and about the answer of balls without inertia
+LOOSE, PUSHED = 1.0, 1e-9  # N/m, less than which nothing is held by, and N, from which it goes where it is pushed
 
 
-@dataclass(frozen=True)
-class Sleeve:
-    """Rings that slide together on a spring: their rows, whether they go with the hub (1) or against it (-1), and the spring's push in the sense of z (N) and its
-    rate (N/m; 0 for a constant force)."""
-
-    rows: tuple[BallRow, ...]
-    towards: int
-    push: float
-    rate: float
-
-
-@dataclass(frozen=True)
-class Rings:
-    """What one movement of a hub (m) balances: rows whose outer rings it moves with it (1) or against it (-1), rows on sleeves, and the load on it (N)."""
-
-    fixed: tuple[tuple[BallRow, int], ...]
-    sleeves: tuple[Sleeve, ...]
-    load: float
-
-    @cached_property
-    def heavy(self) -> bool:
-        rows = [row for row, _ in self.fixed] + [row for s in self.sleeves for row in s.rows]
-        return any(row.inertia is not None for row in rows)
-
-    @property
-    def massless(self) -> Rings:
-        fixed = tuple((changed(row, inertia=None), towards) for row, towards in self.fixed)
-        return Rings(fixed, tuple(changed(s, rows=tuple(changed(row, inertia=None) for row in s.rows)) for s in self.sleeves), self.load)
-
-
-def equilibrium(rings: Rings, centres: Centres) -> tuple[float, ...]:
-    """Movement (m) of the hub without imbalance, and of the rings on every sleeve, by Newton's method, or by bracketing where that does not arrive; that of balls
-    with inertia is sought from the answer of balls without. `centres` keeps where balls settled. Raises `NoEquilibrium`."""
-    without, nowhere = rings.massless if rings.heavy else rings, (0.0,) * (1 + len(rings.sleeves))
-    found = _near(without, nowhere, centres) or _bracketed(without, nowhere, REACH, centres)
-    if rings.heavy:
-        found = _near(rings, found, centres) or _bracketed(rings, found, NEAR, centres)
-    return found
-
-
-def _near(rings: Rings, start: tuple[float, ...], centres: Centres) -> tuple[float, ...] | None:
-    """The equilibrium near a start by Newton's method: of every sleeve f(r) + rate (r - h) = push, of the hub the sum of its rows and springs. None where steps do
-    not end, are long, or nothing is pressed."""
-    hub, slid = start[0], list(start[1:])
-    last = 0.0
-    for _ in range(STEPS):
-        off, stiffness, own = -rings.load, 0.0, []
-        for row, towards in rings.fixed:
-            force, slope = centred_axial(row, towards * hub, centres)
-            off += towards * force
-            stiffness += slope
-        for s, r in zip(rings.sleeves, slid, strict=True):
-            spring = s.push - s.rate * (r - s.towards * hub)
-            answers = [centred_axial(row, r, centres) for row in s.rows]
-            held = sum(slope for _, slope in answers) + s.rate
-            if held <= 0.0:
-                return None
-            missing = spring - sum(force for force, _ in answers)
-            own.append((missing / held, s.towards * s.rate / held))  # how far it goes alone, and with the hub
-            off += s.towards * (spring - s.rate * missing / held)
-            stiffness += s.rate * (1 - s.rate / held)
-        if stiffness <= 0.0:
-            return None
-        step = -off / stiffness
-        moves = [step, *(alone + share * step for alone, share in own)]
-        longest = max(map(abs, moves))
-        if longest > FARTHEST:
-            return None
-        hub, slid = hub + step, [r + m for r, m in zip(slid, moves[1:], strict=True)]
-        # steps that double their digits leave longest^3 / last^2
-        if longest <= EXACT or longest**3 <= EXACT * last**2 or last / 2 < longest < ROUNDED:
-            return hub, *slid
-        last = longest
-    return None
-
-
-def _bracketed(rings: Rings, start: tuple[float, ...], reach: float, centres: Centres) -> tuple[float, ...]:
-    """Every force rises with its movement: brackets about a `start`, for the sleeves within that of the hub."""
-
-    def slid(s: Sleeve, at: float, hub: float) -> float:
-        return _root(lambda r: sum(centred_axial_force(row, r, centres) for row in s.rows) + s.rate * (r - s.towards * hub) - s.push, at, reach)
-
-    def imbalance(hub: float) -> float:
-        found = sum(towards * centred_axial_force(row, towards * hub, centres) for row, towards in rings.fixed) - rings.load
-        for s, at in zip(rings.sleeves, start[1:], strict=True):
-            # whatever rings under a constant force do, it is the push
-            found += s.towards * (s.push - s.rate * (slid(s, at, hub) - s.towards * hub) if s.rate else s.push)
-        return found
-
-    hub = _root(imbalance, start[0], reach)
-    return hub, *(slid(s, at, hub) for s, at in zip(rings.sleeves, start[1:], strict=True))
-
-
-def _root(imbalance: Callable[[float], float], start: float, reach: float) -> float:
-    while reach < 5e-3:
-        if imbalance(start - reach) <= 0 <= imbalance(start + reach):
-            return float(scipy.optimize.brentq(imbalance, start - reach, start + reach, xtol=EXACT, rtol=1e-14))
-        reach *= 4
-    raise NoEquilibrium(f"the bearings find no axial equilibrium within {reach * 1e3:.1f} mm of hub movement")
-
-
-# ---------------------------------------------------------------- of many parts
+def moved_rings(spindle: Spindle, rows: Mapping[str, BallRow], centres: Centres) -> dict[str, float]:
+    """Movement (m) of every row's outer ring against its inner one, where the axial forces on all carriers balance. `centres` keeps where balls settled. Raises `NoEquilibrium`."""
+    moved: dict[str, float] = {}
+    for balance in balances(spindle):
+        try:
+            moved |= balanced(balance, rows, centres)
+        except NoEquilibrium as error:
+            load = f" under axial_load_N = {spindle.axial_load:g}" if spindle.axial_load else ""
+            carriers = dict.fromkeys(c for name in balance.names for c in _carriers(spindle, spindle.bearing(name)))
+            raise NoEquilibrium(f"{error}{load}; they lie between {' and '.join(carriers)}") from None
+    return moved
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
-    """What the movements (m) of n parts along the axis balance: of every row its outer ring's movement against its inner one, `motion` (rows, n) times those of the parts, and the force (N) that was on it as
-    it was put together, `at_reference` (rows,); sleeves: which rows slide on a spring, its push in the sense of z (N) and its rate; the `stiffness` (n, n) of joints between parts, and the `load` on them (n,)."""
+class Balance:
+    """What movements (m) along the axis balance, n of them: of parts that carry rings, and of rings that slide on springs.
 
-    rows: tuple[BallRow, ...]
+    A row's outer ring moves against its inner one by `motion` (rows, n) times the movements, in the order of `names`. `stiffness` (n, n) is that of springs and
+    joints, `force` (n,) what acts beside the rows and these where nothing has moved.
+    """
+
+    names: tuple[str, ...]
     motion: Array
-    at_reference: Array
-    sleeves: tuple[tuple[tuple[int, ...], float, float], ...]
     stiffness: Array
-    load: Array
-
-    def moves(self, y: Array) -> Array:
-        """Movements (rows,) for those of the parts and, after these, of the rings on sleeves."""
-        n = self.motion.shape[1]
-        found = self.motion @ y[:n]
-        for (own, _, _), slid in zip(self.sleeves, y[n:], strict=True):
-            found[list(own)] = slid
-        return np.asarray(found)
-
-    def imbalance(self, y: Array, rows: tuple[BallRow, ...], centres: Centres) -> tuple[Array, Array]:
-        """Of every part and sleeve what is out of balance (N), and its derivatives."""
-        n, answers = self.motion.shape[1], np.array([centred_axial(row, float(m), centres) for row, m in zip(rows, self.moves(y), strict=True)])
-        force, slope = answers.T
-        sliding = [i for own, _, _ in self.sleeves for i in own]
-        fixed = np.setdiff1d(np.arange(len(rows)), sliding)
-        off, by = np.zeros(len(y)), np.zeros((len(y), len(y)))
-        off[:n] = self.motion[fixed].T @ (force - self.at_reference)[fixed] + self.stiffness @ y[:n] - self.load
-        by[:n, :n] = self.motion[fixed].T @ (slope[fixed, None] * self.motion[fixed]) + self.stiffness
-        for k, (own, push, rate) in enumerate(self.sleeves, n):
-            way = self.motion[own[0]]
-            less = rate * (y[k] - way @ y[:n])  # than its push
-            off[:n] -= way * less
-            off[k] = sum(force[list(own)]) - push + less
-            by[:n, :n] += rate * np.outer(way, way)
-            by[:n, k] -= rate * way
-            by[k, :n] -= rate * way
-            by[k, k] = sum(slope[list(own)]) + rate
-        return off, by
+    force: Array
 
 
-def balanced(parts: Parts, centres: Centres) -> Array:
-    """Movement (m) of every row's outer ring against its inner one, by Newton's method, shortened as long as the next step would not be shorter (Deuflhard, *Newton Methods for Nonlinear Problems*, 2004, 3.3); that of
-    balls with inertia is sought from the answer of balls without, whose energy is convex. Raises `NoEquilibrium`."""
-    y = np.zeros(parts.motion.shape[1] + len(parts.sleeves))
-    y = _stepped(parts, y, tuple(changed(row, inertia=None) for row in parts.rows), centres)
-    return parts.moves(_stepped(parts, y, parts.rows, centres))
+def balanced(balance: Balance, rows: Mapping[str, BallRow], centres: Centres) -> dict[str, float]:
+    """Movement (m) of every row's outer ring against its inner one without imbalance; that of balls with inertia is sought from the answer of balls without, whose
+    energy is convex. `centres` keeps where balls settled. Raises `NoEquilibrium`."""
+    own = [rows[name] for name in balance.names]
+    y = np.zeros(len(balance.force))
+    if any(row.inertia is not None for row in own):
+        y = _stepped(balance, y, [changed(row, inertia=None) for row in own], centres)
+    return dict(zip(balance.names, (balance.motion @ _stepped(balance, y, own, centres)).tolist(), strict=True))
 
 
-def _stepped(parts: Parts, y: Array, rows: tuple[BallRow, ...], centres: Centres) -> Array:
-    off, by = parts.imbalance(y, rows, centres)
-    last = np.inf
+def _stepped(balance: Balance, y: Array, rows: list[BallRow], centres: Centres) -> Array:
+    """Newton's method. A row's force rises with its own movement: what is out of balance is the slope of an energy that is convex, of which every step finds less."""
+    here, last = _imbalance(balance, y, rows, centres), 0.0
     for _ in range(MOST):
-        move = _solved(by, -off)
-        length = float(np.abs(move).max(initial=0.0))
-        if length <= EXACT or (length < ROUNDED and length > last / 2):
+        move = -_yielding(*here) @ here[0]
+        length = float(np.abs(move).max())
+        if length <= EXACT or last / 2 < length < ROUNDED:
             return y
-        share = min(1.0, FARTHEST / length)
-        while True:
-            there = y + share * move
-            off, here = parts.imbalance(there, rows, centres)
-            if np.abs(_solved(by, off)).max() <= (1 - share / 4) * length or length < 1e3 * ROUNDED:
-                break
-            share /= 2
-            if share < LEAST:
-                raise NoEquilibrium("the bearings find no axial equilibrium")
-        y, by, last = there, here, length
+        if length**3 <= EXACT * last**2:  # steps that double their digits leave this
+            return np.asarray(y + move)
+        share, there = _along(balance, y, move, float(here[0] @ move), rows, centres)
+        y, here, last = y + share * move, there, length if share == 1.0 else 0.0
     raise NoEquilibrium("the bearings find no axial equilibrium")
 
 
-def _solved(by: Array, off: Array) -> Array:
-    """Where rows hang loose, the shortest move of many."""
-    return np.asarray(np.linalg.lstsq(by, off, rcond=1e-14)[0])
+def _along(balance: Balance, y: Array, move: Array, slope: float, rows: list[BallRow], centres: Centres) -> tuple[float, tuple[Array, Array]]:
+    """The share of a step at which what is out of balance along it has become less than `STEEP` of what it was, the `slope` at its start; and the imbalance there."""
+    length = float(np.abs(move).max())
+    least, most, share = 0.0, np.inf, min(1.0, FARTHEST / length)
+    while share * length < REACH and share - least > 1e-12 * share:
+        there = _imbalance(balance, y + share * move, rows, centres)
+        left = float(there[0] @ move)
+        if abs(left) <= STEEP * abs(slope) or length < 1e3 * ROUNDED:
+            return share, there
+        least, most = (share, most) if left < 0 else (least, share)
+        share = (least + most) / 2 if most < np.inf else 2 * share
+    raise NoEquilibrium(f"the bearings find no axial equilibrium within {REACH * 1e3:g} mm")
+
+
+def _imbalance(balance: Balance, y: Array, rows: list[BallRow], centres: Centres) -> tuple[Array, Array]:
+    """Forces (n,) that are not balanced (N), and their derivatives (n, n)."""
+    forces, slopes = np.array([centred_axial(row, m, centres) for row, m in zip(rows, (balance.motion @ y).tolist(), strict=True)]).T
+    off = forces @ balance.motion + balance.stiffness @ y - balance.force
+    return off, (balance.motion.T * slopes) @ balance.motion + balance.stiffness
+
+
+def _yielding(off: Array, stiffness: Array) -> Array:
+    """The inverse (n, n) of a stiffness: what hangs loose stays, or goes far where it is pushed."""
+    rates, ways = np.linalg.eigh(stiffness)
+    if rates[0] > LOOSE:
+        return np.asarray((ways / rates) @ ways.T)
+    pushed = (rates > LOOSE) | (np.abs(off @ ways) > PUSHED)
+    return np.asarray((ways * (pushed / np.maximum(rates, LOOSE))) @ ways.T)
+
+
+# ---------------------------------------------------------------- what carries the rings
+
+
+@kept
+def balances(spindle: Spindle) -> list[Balance]:
+    """What all rows balance, as drawn: a group of those that share carriers, or whose carriers joints tie together, each."""
+    groups: list[tuple[set[str], list[Bearing]]] = []
+    ties = _ties(spindle)
+    for b in spindle.bearings:
+        carriers = set().union(*(_tied_to(c, (t for t in ties if "ground" not in t)) for c in _carriers(spindle, b))) - {"ground"}
+        touching = [g for g in groups if g[0] & carriers]
+        rest = [g for g in groups if not g[0] & carriers]
+        groups = [*rest, (carriers.union(*(g[0] for g in touching)), [row for g in touching for row in g[1]] + [b])]
+    return [_balance(spindle, group) for _, group in groups]
+
+
+def _carriers(spindle: Spindle, b: Bearing) -> tuple[str, str]:
+    """What carries the inner and the outer ring of a row and is axially rigid."""
+    return spindle.structure.carrier(b.inner_body), spindle.structure.carrier(b.outer_body)
+
+
+def _ties(spindle: Spindle) -> list[tuple[str, str, float]]:
+    """The joints between what is axially rigid, with their axial stiffness (N/m)."""
+    structure = spindle.structure
+    every = [(structure.carrier(j.bodies[0]), structure.carrier(j.bodies[1]), j.stiffness[2]) for j in structure.own_joints]
+    return [(a, b, k) for a, b, k in every if k > 0 and a != b]
+
+
+def _tied_to(part: str, ties: Iterable[tuple[str, str, float]]) -> frozenset[str]:
+    """A part with all that joints tie it to."""
+    ties, found = list(ties), {part}
+    while more := {end for a, b, _ in ties for end in (a, b) if {a, b} & found} - found:
+        found |= more
+    return frozenset(found)
+
+
+def _balance(spindle: Spindle, group: Sequence[Bearing]) -> Balance:
+    """What a group of rows balances. What joints tie to one carrier alone is left out: it moves as far as the rows ask of that one."""
+    of = {b.name: _carriers(spindle, b) for b in group}
+    carriers, ties = tuple(dict.fromkeys(c for pair in of.values() for c in pair)), _ties(spindle)
+    tied = {c: _tied_to(c, ties) for c in carriers}
+    together = [c for c in carriers if sum(c in t for t in tied.values()) > 1]
+    still = "ground" if any("ground" in tied[c] for c in together) else (*together, *carriers)[0]
+    parts = [p for p in dict.fromkeys([*carriers, *(p for c in together for p in sorted(tied[c]))]) if p != still]
+    sprung = [(s, s.spring) for s in spindle.sets if s.spring is not None and s.bearings[0] in of]
+    n = len(parts) + len(sprung)
+    of_part = dict(zip(parts, np.eye(n), strict=False)) | {still: np.zeros(n)}
+    apart = {name: of_part[outer] - of_part[inner] for name, (inner, outer) in of.items()}  # of the seats
+    motion, stiffness, force = dict(apart), np.zeros((n, n)), _load(spindle, of, of_part)
+    for a, b, k in ties:
+        if a in of_part and b in of_part:
+            stiffness += k * np.outer(of_part[a] - of_part[b], of_part[a] - of_part[b])
+    for slides, (bearings, spring) in zip(np.eye(n)[len(parts) :], sprung, strict=True):
+        first = spring.rings_of[0]
+        motion |= dict.fromkeys(spring.rings_of, slides)
+        stiffness += (spring.rate or 0.0) * np.outer(slides - apart[first], slides - apart[first])
+        force += spindle.bearing(first).sense * bearings.preload * slides
+    for bearings in spindle.sets:
+        rows = [spindle.bearing(name) for name in bearings.bearings if name in of]
+        # rows that nothing holds against each other have nothing to be preloaded by
+        if spindle.one_way(bearings) or len({frozenset(tied[c] for c in of[b.name]) for b in rows}) == 1:
+            force += sum((b.sense * b.preload * motion[b.name] for b in rows if motion[b.name] is apart[b.name]), np.zeros(n))
+    return Balance(tuple(of), np.array([motion[name] for name in of]), stiffness, force)
+
+
+def _load(spindle: Spindle, of: Mapping[str, tuple[str, str]], of_part: Mapping[str, Array]) -> Array:
+    """The axial load (n,), for bearings feel the motion between rings alone: on the one part that carries all outer rings, or its opposite on the one that carries all inner ones; of both, and of several, on what
+    turns, for joints hold what stands."""
+    none = np.zeros_like(next(iter(of_part.values())))
+    if not spindle.axial_load:
+        return none
+    (inner, outer), carriers = next(iter(of.values())), {c for pair in of.values() for c in pair}
+    ways = [(part, sign * of_part[part]) for k, part, sign in ((1, outer, 1.0), (0, inner, -1.0)) if len(carriers) == 2 or all(pair[k] == part for pair in of.values())]
+    turning = carriers & {spindle.structure.carrier(b.name) for b in spindle.structure.bodies if b.turns}
+    ways.sort(key=lambda way: way[0] not in turning)
+    found = [load for part, load in ways if load.any() and (part in turning or len(carriers) == 2 or not turning)]
+    if not found:
+        raise NoEquilibrium(
+            f"axial_load_N = {spindle.axial_load:g}: there is no one part that turns and carries all inner rings, or all outer ones, for it to act on; rings are on {', '.join(sorted(carriers))}"
+        )
+    return spindle.axial_load * found[0]

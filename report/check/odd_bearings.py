@@ -9,7 +9,7 @@ import numpy as np
 
 from thermospindle.model import sense
 from thermospindle.model.bearing.definitions import ToldAngle
-from thermospindle.model.bearing.pair import joined
+from thermospindle.model.bearing.movement import balances
 from thermospindle.model.bearing.pressure import OF_BALLS, OF_ROLLERS, pressures
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import listed
@@ -209,13 +209,13 @@ def _pushed(found: Looked) -> Iterator[str]:
     spindle = found.spindle
     if spindle.axial_load:
         return
-    for group in joined(spindle):
-        own = {b.name for b in group}
+    for group in balances(spindle):
+        own = set(group.names)
         one_way = [s for s in spindle.sets if s.bearings[0] in own and spindle.one_way(s)]
         if not sum(spindle.bearing(s.bearings[0]).sense * s.preload for s in one_way):
             continue
         for s in (s for s in one_way if s.spring is not None):
-            others = [b.name for b in group if b.name not in s.bearings]
+            others = [name for name in group.names if name not in s.bearings]
             if others:
                 push = spindle.bearing(s.bearings[0]).sense * s.preload
                 yield (

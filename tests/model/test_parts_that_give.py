@@ -6,10 +6,11 @@ import tomllib
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from tests.conftest import ROOT
-from thermospindle.model.bearing.pair import _loaded_part
+from thermospindle.model.bearing.movement import _load
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import build
@@ -60,13 +61,49 @@ def test_a_soft_joint_is_a_spring_behind_the_ring(rate):
     assert max(through_the_plate) > 1.02 * 180.0 or rate < 1e6  # at speed the rings give, and the preload rises less the softer it is held
 
 
+def test_a_joint_beside_the_bearings_takes_the_load():
+    """Between what carries inner and outer rings, as a magnetic thrust bearing is: of a load it takes what its rate is of the whole. It was left out of the balance."""
+
+    def sharing(rate: float, load: float) -> list[float]:
+        raw = tomllib.loads(FILE.read_text(encoding="utf-8"))
+        raw["axial_load_N"] = load
+        for key in ("preload_rate_N_per_m", "sprung_bearings", "sprung_ring_mass_g"):
+            raw["sets"]["main"].pop(key, None)
+        raw["sets"]["main"]["preload_kind"] = "rigid"
+        lateral = {"lateral_stiffness_N_per_m": [1.0, 1.0], "tilt_stiffness_N_m_per_rad": [1.0, 1.0], "damping_ratio": 0.02}
+        raw["structure"]["joints"].append({"name": "thrust", "group": "thrust", "between": ["housing", "spindle"], "z_mm": 164.0, "axial_stiffness_N_per_m": rate, **lateral})
+        return preloads(build(raw, FILE))
+
+    alone, borne = sharing(1e-3, 40.0), sharing(1e13, 40.0)
+    assert borne == pytest.approx(sharing(1e13, 0.0), rel=1e-5)
+    assert alone == pytest.approx(preloads(mounted(load=40.0, preload_kind="rigid")), rel=1e-6)
+    assert abs(alone[0] - borne[0]) > 5.0
+
+
+def of_parts(**of: tuple[str, str]) -> tuple[SimpleNamespace, dict, dict]:
+    """Rows between parts that turn (spindle, wheel) or stand, with a load; the first part is still."""
+    parts = list(dict.fromkeys(p for pair in of.values() for p in pair))
+    bodies = [SimpleNamespace(name=p, turns=p in ("spindle", "wheel")) for p in parts]
+    spindle = SimpleNamespace(axial_load=40.0, structure=SimpleNamespace(bodies=bodies, carrier=lambda name: name))
+    return spindle, of, {p: row for p, row in zip(parts, np.vstack([np.zeros(len(parts) - 1), np.eye(len(parts) - 1)]), strict=True)}
+
+
 def test_a_load_on_no_one_part_is_refused():
-    """Three rows in a chain of four parts: what would it act on?"""
-    of = {"a": ("spindle", "housing"), "b": ("spindle", "plate"), "c": ("wheel", "plate")}
-    rotor = SimpleNamespace(of=of, carriers=["spindle", "housing", "plate", "wheel"])
-    with pytest.raises(NoEquilibrium, match="axial_load_N = 40: there is no one part that carries all inner rings, or all outer ones"):
-        _loaded_part(SimpleNamespace(axial_load=40.0), rotor, rotor.carriers)
-    assert _loaded_part(SimpleNamespace(axial_load=0.0), rotor, rotor.carriers).tolist() == [0.0] * 4
+    """Three rows in a chain of four parts: what would it act on? And on a housing that carries all outer rings, about two shafts that turn, joints that hold it would take it all."""
+    for rows in ({"a": ("spindle", "housing"), "b": ("spindle", "plate"), "c": ("wheel", "plate")}, {"a": ("spindle", "housing"), "b": ("wheel", "housing")}):
+        with pytest.raises(NoEquilibrium, match="axial_load_N = 40: there is no one part that turns and carries all inner rings, or all outer ones"):
+            _load(*of_parts(**rows))
+    spindle, of, parts = of_parts(**rows)
+    spindle.axial_load = 0.0
+    assert _load(spindle, of, parts).tolist() == [0.0] * 2
+
+
+def test_a_load_acts_on_what_carries_outer_rings_or_against_what_carries_inner_ones():
+    assert _load(*of_parts(a=("housing", "wheel"), b=("plate", "wheel"))).tolist() == [40.0, 0.0]
+    assert _load(*of_parts(a=("housing", "wheel"), b=("housing", "wheel"))).tolist() == [40.0]
+    assert _load(*of_parts(a=("housing", "wheel"), b=("wheel", "housing"))).tolist() == [40.0]
+    spindle, of, _ = of_parts(a=("spindle", "housing"), b=("spindle", "plate"))
+    assert _load(spindle, of, {"housing": np.zeros(2), "plate": np.eye(2)[0], "spindle": np.eye(2)[1]}).tolist() == [0.0, -40.0]
 
 
 def test_parts_that_nothing_ties_together_are_not_preloaded_against_each_other():
