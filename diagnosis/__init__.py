@@ -15,7 +15,7 @@ verdict       `spindle diagnose`
 fleet         many campaigns of one drawing, a row each, and which stand apart
 line_fit      toleranced parameters fitted to the lines of one test, for scripts
 draft/        an effect of one's own from what drifts, by the simplest law of physics that fits
-answer        what `add` and the workbench take of an answer of `spindle diagnose --json`
+answer        answers of `spindle diagnose --json` read again; what `add` and the workbench take of one
 add           a scene with more effects and the tolerances fitted beside them
 ============  ====================================================================================================
 

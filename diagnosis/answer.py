@@ -1,10 +1,11 @@
-"""What `add` and the workbench take of an answer of `spindle diagnose --json`: its candidates with their values, and the tolerances fitted beside the best."""
+"""Answers of `spindle diagnose --json`, as they are read again; and what `add` and the workbench take of one: its candidates with their values, and the tolerances fitted beside the best."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,20 +42,35 @@ class Answer:
     drafted: frozenset[str] = frozenset()
 
 
-def read_answer(file: Path) -> Answer:
-    """The file of an answer of `spindle diagnose --json`; `BadInput` for another."""
-    if not file.is_file():
-        raise BadInput(f"--from {file}: cannot be read: {absent(file)}")
+@contextmanager
+def told_by(where: str, what: str) -> Iterator[None]:
+    """Within it, whatever is not as an answer has it ends in a `BadInput`: `where` it is from is what that begins with, and `what` is looked for there what it ends with."""
     try:
-        raw = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadInput(f"--from {file}: cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError):
-        raise BadInput(f"--from {file}: {NO_ANSWER}") from None
-    return answer_of(migrated(DIAGNOSIS, raw, f"--from {file}"), f"--from {file}")
+        yield
+    except BadInput:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise BadInput(f"{where}: is not an answer of spindle diagnose --json, with {what}") from None
 
 
-NO_ANSWER = "is not an answer of spindle diagnose --json, with candidates of effects and parameters"
+CANDIDATES = "candidates of effects and parameters"
+
+
+def read_raw(file: Path, where: str, what: str = CANDIDATES) -> Any:
+    """The file of an answer as it was written, in today's format; `BadInput` as `told_by` has it."""
+    if not file.is_file():
+        raise BadInput(f"{where}: cannot be read: {absent(file)}")
+    with told_by(where, what):
+        try:
+            raw = json.loads(file.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise BadInput(f"{where}: cannot be read: {error.strerror}") from None
+        return migrated(DIAGNOSIS, raw, where)
+
+
+def read_answer(file: Path) -> Answer:
+    """The file of an answer that is told by `--from`; `BadInput` for another."""
+    return answer_of(read_raw(file, f"--from {file}"), f"--from {file}")
 
 
 def _kind(name: str) -> str:
@@ -64,7 +80,7 @@ def _kind(name: str) -> str:
 
 def answer_of(raw: Any, where: str) -> Answer:
     """The same from the object of such an answer; `where` it is from is what a refusal begins with."""
-    try:
+    with told_by(where, CANDIDATES):
         candidates = tuple(_offered(c) for c in raw["candidates"])
         drafted = frozenset(_text(p["element"]) for p in raw.get("where", ()))
         tolerances = {name: _finite(row["value"]) for name, row in raw.get("tolerances", {}).items()}
@@ -72,8 +88,6 @@ def answer_of(raw: Any, where: str) -> Answer:
         kinds = {name: row.get("kind", _kind(name)) for name, row in raw.get("tolerances", {}).items()}
         best = candidates[0].effects if candidates and raw.get("effects") else tuple(map(_text, raw.get("tolerances_beside", ())))
         scene_hash = raw.get("scene_hash")
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
-        raise BadInput(f"{where}: {NO_ANSWER}") from None
     build = {name: float(f"{v:.8g}") for name, v in built.items() if kinds[name] == BUILD}
     tests = tuple(str(raw["tolerances"][name].get("test", name.removeprefix(OF_TEST))) for name in tolerances if kinds[name] == TEMPERATURE)
     return Answer(candidates, best, build, tests, scene_hash, drafted)

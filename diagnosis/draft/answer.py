@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
+from thermospindle.diagnosis.answer import read_raw, told_by
 from thermospindle.diagnosis.decision.loss import NAMING
 from thermospindle.diagnosis.draft.laws import REFERENCE
-from thermospindle.model.errors import BadInput, absent
-from thermospindle.model.files.formats import DIAGNOSIS, migrated
+from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
 
 LEAST = -0.999  # of what was: nothing falls further
@@ -88,10 +87,9 @@ def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[
     """The first that would have to drift, or `element`, the reference temperature (C) of the scene, the effects that the verdict names, without which that would drift, and whether the build tolerances
     of the answer are those fitted beside it. Raises `BadInput` where the file holds none, one that
     changes by nothing, or a name that cannot stand in a Python file."""
-    if not diagnosis.is_file():
-        raise BadInput(f"{diagnosis}: cannot be read: {absent(diagnosis)}")
-    try:
-        told = migrated(DIAGNOSIS, json.loads(diagnosis.read_text(encoding="utf-8")), diagnosis)
+    what = "elements that drift in `where`"
+    told = read_raw(diagnosis, str(diagnosis), what)
+    with told_by(str(diagnosis), what):
         reference = float(told.get("reference_temperature_C", REFERENCE))
         if not -273.15 < reference < LARGEST:
             raise ValueError
@@ -99,12 +97,6 @@ def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[
         beside = {str(e) for e in told.get("tolerances_beside", ())}
         named = tuple(str(e) for e in told.get("effects", ())) if told.get("verdict") in NAMING else ()
         found = [Place.model_validate(p) for p in told["where"] if element in (None, p["element"])][:1]
-    except OSError as error:
-        raise BadInput(f"{diagnosis}: cannot be read: {error.strerror}") from None
-    except BadInput:
-        raise
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
-        raise BadInput(f"{diagnosis}: is not an answer of spindle diagnose --json with elements that drift in `where`") from None
     if not found and element is None:
         raise BadInput(f"{diagnosis}: where: is empty; the diagnosis found nothing that drifts, and there is nothing to draft")
     if not found:

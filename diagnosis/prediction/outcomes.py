@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isclose
@@ -12,10 +11,9 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
+from thermospindle.diagnosis.answer import read_raw, told_by
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.diagnosis.prediction.temperature import whitened
-from thermospindle.model.errors import BadInput, absent
-from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
@@ -44,11 +42,10 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
     A test is the one that was planned where temperature, speed, level and soak time are: what is not told of the latter is a light tap, after all the time
     that it takes.
     """
-    if not file.is_file():
-        raise BadInput(f"--predictions {file}: cannot be read: {absent(file)}")
-    try:
-        planned = migrated(DIAGNOSIS, json.loads(file.read_text(encoding="utf-8")), f"--predictions {file}")["next_test"]
-        rows = [(dict(p["condition"]), dict(p["predicted"])) for p in planned]
+    where, what = f"--predictions {file}", "predictions in next_test"
+    told = read_raw(file, where, what)
+    with told_by(where, what):
+        rows = [(dict(p["condition"]), dict(p["predicted"])) for p in told["next_test"]]
         return [
             outcome
             for condition, predicted in rows
@@ -57,12 +54,6 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
             for name, modes in predicted.items()
             if (outcome := _outcome(o, name, *_table(modes))) is not None
         ]
-    except OSError as error:
-        raise BadInput(f"--predictions {file}: cannot be read: {error.strerror}") from None
-    except BadInput:
-        raise
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
-        raise BadInput(f"--predictions {file}: is not an answer of spindle diagnose --json with predictions in next_test") from None
 
 
 def _table(modes: Sequence[dict[str, Any]]) -> tuple[Array, Array]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +10,9 @@ from typing import Any
 from markupsafe import Markup
 
 from thermospindle.diagnosis import verdict
-from thermospindle.diagnosis.answer import answer_of, fitted_values, read_answer
+from thermospindle.diagnosis.answer import answer_of, fitted_values, read_raw, told_by
 from thermospindle.diagnosis.compare.before_after import without
-from thermospindle.model.errors import BadInput, absent
-from thermospindle.model.files.formats import DIAGNOSIS, migrated
+from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.workbench.bench import Bench
@@ -50,20 +48,13 @@ class Explanations:
 
 def read_explanations(file: Path, bench: Bench) -> Explanations:
     """The explanations of an answer of `spindle diagnose --json`; `BadInput` for another file."""
-    if not file.is_file():
-        raise BadInput(f"--diagnosis {file}: cannot be read: {absent(file)}")
-    try:
-        read_answer(file)
-    except BadInput as error:
-        raise BadInput(str(error).replace("--from", "--diagnosis", 1)) from None
-    raw = migrated(DIAGNOSIS, json.loads(file.read_text(encoding="utf-8")), f"--diagnosis {file}")
-    return explanations(raw, bench, f"--diagnosis {file}")
+    return explanations(read_raw(file, f"--diagnosis {file}"), bench, f"--diagnosis {file}")
 
 
 def explanations(raw: Mapping[str, Any], bench: Bench, where: str) -> Explanations:
     """What the workbench shows of an answer; candidates with effects that cannot be added to this scene are left away."""
     answer, known, rows = answer_of(raw, where), {e.name for e in bench.effects}, []
-    try:
+    with told_by(where, "a verdict and probabilities"):
         for candidate, offered in zip(raw["candidates"], answer.candidates, strict=True):
             names = offered.effects
             if not set(names) <= known:
@@ -73,10 +64,6 @@ def explanations(raw: Mapping[str, Any], bench: Bench, where: str) -> Explanatio
             rows.append(Explanation(names, float(candidate["probability"]), float(candidate["delta_evidence"]), values, own))
         odds = {key: float(raw["probability"][key]) for key in ("none", "unknown")}
         return Explanations(str(raw["verdict"]), str(raw["reason"]), tuple(rows), odds["none"], odds["unknown"], answer.scene_hash in (None, content_hash(bench.spindle)))
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, BadInput):
-            raise
-        raise BadInput(f"{where}: is not an answer of spindle diagnose --json, with a verdict and probabilities") from None
 
 
 def find(bench: Bench, s: Setting, progress: Callable[[str], None]) -> Explanations:
