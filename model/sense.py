@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from thermospindle.model.bearing.definitions import Bearing, RollerBearing
 from thermospindle.model.bearing.pair import BearingState
+from thermospindle.model.bearing.row import relative_speed
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices
@@ -18,7 +20,7 @@ from thermospindle.model.units import MM, RPM
 COLDEST, HOTTEST = -40.0, 120.0
 """C. Below, rolling-bearing greases no longer lubricate; above, bearing steel that is not stabilised grows (SKF, Rolling bearings, 2018)."""
 FASTEST = 2.5e6
-"""mm rev/min, speed times pitch diameter: what ball bearings reach with ceramic balls and oil-air (Abele et al., CIRP Annals 59, 2010)."""
+"""mm rev/min, speed times pitch diameter: what rolling bearings reach, with ceramic balls and oil-air (Abele et al., CIRP Annals 59, 2010)."""
 STRONGEST = 1e9
 """Pa: rho v^2, the hoop stress of a thin ring by its own rotation (Timoshenko, *Strength of Materials*, part 2, 1956), that quenched steel does not bear for long."""
 AGAINST = 0.01  # of its preload, or of 1 N, by which a row is loaded against its sense
@@ -41,12 +43,12 @@ def of_conditions(spindle: Spindle, conditions: Sequence[Condition]) -> list[str
             )
     fastest = max(abs(c.speed) for c in conditions)
     alike: dict[str, list[str]] = {}  # bearings by their speed factor, as it is told
-    for b in spindle.bearings:
-        reached = fastest / RPM * b.pitch_diameter / MM
+    for b in spindle.rolling:
+        reached = speed_factor(spindle, b, fastest)
         if reached > FASTEST:
             alike.setdefault(f"{reached:.3g}", []).append(b.name)
     said += [
-        f"{fastest / RPM:g} rpm means a speed factor n dm of {reached} mm rev/min in the {listed(names)} bearing{'s' * (len(names) > 1)}; ball bearings "
+        f"{fastest / RPM:g} rpm means a speed factor n dm of {reached} mm rev/min in the {listed(names)} bearing{'s' * (len(names) > 1)}; rolling bearings "
         f"end at about {FASTEST:.2g}"
         for reached, names in alike.items()
     ]
@@ -57,6 +59,11 @@ def of_conditions(spindle: Spindle, conditions: Sequence[Condition]) -> list[str
         if density * rim**2 > STRONGEST:
             said.append(f"{fastest / RPM:g} rpm means {rim:.0f} m/s at the largest diameter of shaft {shaft.name!r}, where a ring bears {np.sqrt(STRONGEST / density):.0f} m/s of its own rotation")
     return said
+
+
+def speed_factor(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> float:
+    """n dm (mm rev/min) of a bearing: the speed of its rings against each other, where the spindle has `speed` (rad/s), times its pitch diameter."""
+    return relative_speed(spindle, b, speed) / RPM * b.pitch_diameter / MM
 
 
 def of_states(spindle: Spindle, states: Iterable[Sequence[BearingState]]) -> list[str]:

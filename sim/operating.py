@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
@@ -38,12 +38,15 @@ from thermospindle.thermal.expansion import expand
 class OperatingPoint:
     """One spindle at one condition; what follows from it is computed when first asked.
 
-    `spindle` is the drawing as the effects of the scene leave it at this condition, `condition` as they have it.
+    `spindle` is the drawing as the effects of the scene leave it at this condition. `condition` is what was asked for, and that which effects make of it
+    (`thermometer_error`) the state's own. `regions` are the temperatures (C) of the section, one of all or by region, and `motions` the rings', by bearing.
     """
 
     spindle: Spindle
     condition: Condition
     state: PairState
+    regions: float | Mapping[str, float]
+    motions: Mapping[str, RingMotion]
     effects: tuple[tuple[Effect, Values], ...] = ()
 
     def __repr__(self) -> str:
@@ -55,7 +58,7 @@ class OperatingPoint:
         chain = rotor_base(self.spindle, self.state)
         for effect, values in self.effects:
             if effect.chain:
-                chain = effect.chain(self.spindle, self.condition, values, chain)
+                chain = effect.chain(self.spindle, self.state.condition, values, chain)
         return chain
 
     @cached_property
@@ -66,7 +69,7 @@ class OperatingPoint:
         chain = Measurement(rows, hammers, np.ones(len(rows)), np.zeros(len(rows)), 0.0)
         for effect, values in self.effects:
             if effect.measurement:
-                chain = effect.measurement(self.spindle, self.condition, values, self.chain, chain)
+                chain = effect.measurement(self.spindle, self.state.condition, values, self.chain, chain)
         return chain
 
     @cached_property
@@ -75,7 +78,7 @@ class OperatingPoint:
         found = self.spindle.imperfections
         for effect, values in self.effects:
             if effect.imperfections:
-                found = effect.imperfections(self.spindle, self.condition, values, found)
+                found = effect.imperfections(self.spindle, self.state.condition, values, found)
         return found
 
     def spec(self, element: str = "linear", looks: bool = False) -> mujoco.MjSpec:
@@ -150,18 +153,20 @@ def equilibrium(
     spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]], expansion: Callable[[Spindle], dict[str, RingMotion]] | None = None
 ) -> OperatingPoint:
     """The operating point where the rings have settled, before any of the `effects` changes what bearings are there, or joints."""
+    asked = condition
     for effect, values in effects:
         if effect.condition:
             condition = effect.condition(spindle, condition, values)
     spindle = drawing(spindle, condition, effects)
     if expansion and (prescribing := [effect.name for effect, _ in effects if effect.temperatures]):
         raise ValueError(f"region temperatures are given, and {', '.join(prescribing)} would prescribe them")
-    motions = expansion(spindle) if expansion else expand(spindle, _region_temperatures(spindle, condition, effects))
+    regions = _region_temperatures(spindle, condition, effects)
+    motions = expansion(spindle) if expansion else expand(spindle, regions)
     for effect, values in effects:
         if effect.motions:
             motions = effect.motions(spindle, condition, values, motions)
     try:
-        return OperatingPoint(spindle, condition, loaded(spindle, solve(spindle, condition, motions)))
+        return OperatingPoint(spindle, asked, loaded(spindle, solve(spindle, condition, motions)), regions, motions)
     except NoEquilibrium as error:
         raise NoEquilibrium(f"at {condition.temperature:g} C and {condition.speed / RPM:g} rpm {'; '.join([str(error), *sense.of_conditions(spindle, [condition])])}") from None
 
@@ -171,8 +176,8 @@ def acted_on(settled: OperatingPoint, effects: Sequence[tuple[Effect, Values]]) 
     state = settled.state
     for effect, values in effects:
         if effect.pair:
-            state = effect.pair(settled.spindle, settled.condition, values, state)
-    return OperatingPoint(settled.spindle, settled.condition, state, tuple(effects))
+            state = effect.pair(settled.spindle, settled.state.condition, values, state)
+    return replace(settled, state=state, effects=tuple(effects))
 
 
 def doubts(spindle: Spindle, points: Sequence[OperatingPoint]) -> list[str]:
@@ -211,24 +216,25 @@ def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effe
 
 def stiffness_table(spindle: Spindle, temperatures: Sequence[float], speeds: Sequence[float] = (0.0,)) -> StiffnessTable:
     """Bearing properties over temperature (C) and speed (rad/s), and the temperature at which a bearing unloads."""
-    points = [[operating_point(spindle, Condition(t, speed)) for speed in sorted(set(speeds))] for t in sorted(set(temperatures))]
+    temperatures, speeds = sorted(set(temperatures)), sorted(set(speeds))
+    points = [[operating_point(spindle, Condition(t, speed)) for speed in speeds] for t in temperatures]
+    lost = {b.name: unloads(spindle, [row[0] for row in points], b.name) for b in spindle.bearings}
     states = [[point.state for point in row] for row in points]
-    lost = {b.name: unloads(spindle, [row[0] for row in states], b.name) for b in spindle.bearings}
-    return tabulate(states, lost, provenance(spindle), [[pressures(point.spindle, point.state) for point in row] for row in points])
+    return tabulate(temperatures, speeds, states, lost, provenance(spindle), [[pressures(point.spindle, point.state) for point in row] for row in points])
 
 
-def unloads(spindle: Spindle, states: Sequence[PairState], bearing: str) -> float | None:
-    """Temperature (C) between two neighbouring states at which a bearing loses contact, to a millikelvin."""
+def unloads(spindle: Spindle, points: Sequence[OperatingPoint], bearing: str) -> float | None:
+    """Temperature (C) between two neighbouring points at which a bearing loses contact, to a millikelvin."""
 
     def deformation(temperature: float) -> float:
-        condition = Condition(temperature, states[0].condition.speed)
+        condition = Condition(temperature, points[0].condition.speed)
         state = operating_point(spindle, condition).state.bearing(bearing)
         return state.deformation if state.in_contact else min(state.deformation, -1e-12)
 
-    for cold, hot in pairwise(states):
-        if cold.bearing(bearing).in_contact != hot.bearing(bearing).in_contact:
+    for cold, hot in pairwise(points):
+        if cold.state.bearing(bearing).in_contact != hot.state.bearing(bearing).in_contact:
             return float(scipy.optimize.brentq(deformation, cold.condition.temperature, hot.condition.temperature, xtol=1e-3))
-    return None if states[0].bearing(bearing).in_contact else states[0].condition.temperature
+    return None if points[0].state.bearing(bearing).in_contact else points[0].condition.temperature
 
 
 def provenance(spindle: Spindle) -> dict[str, str]:

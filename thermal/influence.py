@@ -249,6 +249,5 @@ def _answer(question: Elastic, start: PartMesh) -> tuple[Response, Convergence]:
 
 def forget() -> None:
     """Drop what this process has kept, so that it reads from disk or computes again as a new one would."""
-    _kept.cache_clear()
-    _gains.cache_clear()
-    _at_reference.cache_clear()
+    for kept in (_kept, _space, _response, _gains, _at_reference):
+        kept.cache_clear()

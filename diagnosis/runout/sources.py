@@ -126,7 +126,7 @@ def of_effect(found: Sources, effect: Effect, values: Values) -> dict[SourceKey,
     shown: dict[Key, ComplexArray] = {}
     width = next(iter(found.shown.values())).shape
     for t, point in enumerate(found.points):
-        made = effect.imperfections(point.spindle, point.condition, values, Imperfections())
+        made = effect.imperfections(point.spindle, point.state.condition, values, Imperfections())
         for key, value in phasors(point, made, found.probes[t]).items():
             shown.setdefault(key, np.zeros(width, complex))[t, : len(value)] = value
     amplitudes: dict[SourceKey, complex] = {}

@@ -15,7 +15,7 @@ import numpy as np
 from thermospindle.model.bearing.ball_row import BallRow
 from thermospindle.model.bearing.centred import Centres, centred_axial
 from thermospindle.model.changed import changed
-from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.errors import NoEquilibrium, listed
 from thermospindle.model.machine import Bearing, Spindle, kept
 from thermospindle.model.types import Array
 
@@ -121,6 +121,9 @@ def balances(spindle: Spindle) -> list[Balance]:
         touching = [g for g in groups if g[0] & carriers]
         rest = [g for g in groups if not g[0] & carriers]
         groups = [*rest, (carriers.union(*(g[0] for g in touching)), [row for g in touching for row in g[1]] + [b])]
+    if spindle.axial_load and len(groups) > 1:
+        apart = "; ".join(listed([b.name for b in group]) for _, group in groups)
+        raise NoEquilibrium(f"axial_load_N = {spindle.axial_load:g}: there is no one part that carries all inner rings, or all outer ones, for it to act on; rows that share no part are {apart}")
     return [_balance(spindle, group) for _, group in groups]
 
 

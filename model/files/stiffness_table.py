@@ -97,9 +97,10 @@ def _between(grid: Array, values: Array, where: float, name: str, unit: str) -> 
 
 
 def tabulate(
-    states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str], pressures: Sequence[Sequence[Mapping[str, float]]] = ()
+    temperatures: Sequence[float], speeds: Sequence[float], states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str],
+    pressures: Sequence[Sequence[Mapping[str, float]]] = (),
 ) -> StiffnessTable:
-    """Table of pair states on a grid: `states[i][j]` at temperature i and speed j, and as many `pressures` (Pa, by bearing), or none."""
+    """Table of pair states on a grid: `states[i][j]` at temperature i (C) and speed j (rad/s), and as many `pressures` (Pa, by bearing), or none."""
     bearings = states[0][0].all_bearings
     further = [of for kind, of in ((BearingState, OF_BALLS), (RollerState, OF_ROLLERS)) if any(isinstance(b, kind) for b in bearings)]
     every = [b for row in states for state in row for b in state.all_bearings]
@@ -119,8 +120,8 @@ def tabulate(
             for b in bearings:
                 values[b.name][key] = column(b.name, lambda own, at=at: own.stiffness[at])
     return StiffnessTable(
-        np.array([row[0].condition.temperature for row in states]),
-        np.array([state.condition.speed for state in states[0]]),
+        np.array(temperatures, float),
+        np.array(speeds, float),
         values,
         dict(unloads),
         dict(provenance),

@@ -26,8 +26,8 @@ from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, m
 from thermospindle.model.rotor.static import displacement, firmly
 from thermospindle.model.types import Array
 
-SMALL = 1e-9
-"""Of the load, what may be left of the balance."""
+SMALL, ROUNDED = 1e-9, 1e-15
+"""Of the displacement, and in m or rad beside it, what may be left of the balance."""
 MOST_STEPS = 60
 SLACK = 1.0
 """Rate (N/m) of a spring that keeps its force: a tenth of a millimetre changes that by 1e-4 N."""
@@ -149,7 +149,7 @@ def _balanced(s: _Structure, answers: Sequence[Callable[[Array], tuple[Array, Ar
         if step is None or not np.isfinite(step).all():
             return None
         v = v + step
-        if np.abs(s.basis @ step).max() <= SMALL * np.abs(s.basis @ v).max():
+        if np.abs(s.basis @ step).max() <= SMALL * np.abs(s.basis @ v).max() + ROUNDED:
             return v
     return None
 

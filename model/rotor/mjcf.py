@@ -25,6 +25,7 @@ from thermospindle.model.rotor.look import dress
 from thermospindle.model.types import Array
 
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "tilt_x": (1, 0, 0), "tilt_y": (0, 1, 0)}
+LEAST_INERTIA = 4e-15  # kg m2, of a body in two: MuJoCo refuses anything below 1e-15
 CARRIER_SHARE = 1e-9  # of the turning body's inertia, left on the carrier because MuJoCo wants every moving body to have some
 
 
@@ -85,8 +86,9 @@ def joint_names(chain: RotorBase) -> list[str]:
 
 def _add_bodies(out: mujoco.MjSpec, chain: RotorBase) -> None:
     for body in chain.bodies:
-        small = max(1e-3 * body.mass * 0.01**2, 1e-12)  # an inertia for directions that no joint turns
-        inertia = [max(i, small) for i in body.inertia]
+        small = max(1e-3 * body.mass * 0.01**2, 1e-12)  # an inertia for directions that nothing turns in
+        turned = ("tilt_x" in body.moves, "tilt_y" in body.moves, body.turns)
+        inertia = [max(i, LEAST_INERTIA if turns else small) for i, turns in zip(body.inertia, turned, strict=True)]
         nearest = min(max(inertia[2], abs(inertia[0] - inertia[1])), inertia[0] + inertia[1])
         if body.turns and abs(nearest - inertia[2]) > 1e-9 * inertia[2]:
             raise ValueError(
@@ -94,7 +96,7 @@ def _add_bodies(out: mujoco.MjSpec, chain: RotorBase) -> None:
                 "each must be at most the sum of the others"
             )
         inertia[2] = nearest  # MuJoCo wants it possible; nothing feels the polar one of a body that does not turn
-        share = max(CARRIER_SHARE, 2e-15 / min(body.mass, *inertia)) if body.turns else 1.0  # MuJoCo refuses anything below 1e-15
+        share = max(CARRIER_SHARE, LEAST_INERTIA / 2 / min(body.mass, *inertia)) if body.turns else 1.0
         outer = out.worldbody.add_body(
             name=f"{body.name} carrier" if body.turns else body.name,
             pos=[0, 0, body.z],
@@ -131,7 +133,7 @@ def add_matrices(out: mujoco.MjSpec, name: str, stiffness: Array, damping: Array
     for i, row in enumerate(vector.T @ rows):
         present = {kind: [size[i], 0, 0] for kind, size in sizes.items() if abs(size[i]) > 1e-14 * np.abs(size).max(initial=0.0)}
         if present and row.any():
-            _wrap(out.add_tendon(name=f"{name}{i}", **present), chain, row)
+            _wrap(out.add_tendon(name=f"{name} [{i}]", **present), chain, row)  # no point is called so
 
 
 def _slides(chain: RotorBase) -> list[int]:

@@ -97,7 +97,7 @@ def _read(file: Path, bearing: str | None, key: str) -> tuple[tuple[float, ...],
         if None in row:  # what is left of a row that has more cells than the header
             raise BadInput(f"{where}: has more cells than the header has columns; numbers have a point, not a comma")
         told = {c: _number(where, c, row[c]) for c in (*WHERE, *COLUMNS, *BY_DIRECTION, *BETWEEN) if c in row}
-        at = told["temperature_C"], told["speed_rpm"] * RPM
+        at = told["temperature_C"], abs(told["speed_rpm"]) * RPM  # a matrix that is symmetric does not know which way it turns
         k = _matrix(told)
         if at in values:
             raise BadInput(f"{where}: {at[0]:g} C and {at[1] / RPM:g} rpm stand twice{'' if bearing else '; which bearing? say bearing = ...'}")

@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.bearing.row import contact_constants, reference_motion, ring_speeds
 from thermospindle.model.errors import BadInput, instead
-from thermospindle.model.machine import Bearing, Region, Spindle
+from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
 from thermospindle.model.rotor.section import cells
 from thermospindle.model.shaft import SAME_HEIGHT
 
@@ -82,36 +82,7 @@ def check_section(file: Path, spindle: Spindle) -> None:
 def check_bearings(file: Path, spindle: Spindle) -> None:
     for b in spindle.bearings:
         where = f"{file}: bearings.{b.name}"
-        for key, name in (("inner_ring", b.inner_ring), ("outer_ring", b.outer_ring)):
-            if name not in {g.name for g in spindle.regions}:
-                raise BadInput(f"{where}.{key} = {name!r}: names no section region; {_region_instead(spindle, name)}")
-            ring = spindle.region(name)
-            if not ring.z[0] <= b.z <= ring.z[1]:
-                raise BadInput(f"{where}.z_mm = {b.z * 1e3:g}: outside its ring {name!r}, which spans z_mm = {_mm(ring.z)}")
-        for key, name in (("ball_material", b.ball_material), ("ring_material", b.ring_material)):
-            if name not in spindle.materials:
-                raise BadInput(f"{where}: {key} = {name!r}: allowed are {', '.join(spindle.materials)}")
-        inner, outer = spindle.region(b.inner_ring), spindle.region(b.outer_ring)
-        if inner.part == outer.part:
-            raise BadInput(f"{where}: both rings are on the {inner.part} part; one ring must turn")
-        if (outer.part == "rotating") != (b.turning_ring == "outer"):
-            raise BadInput(
-                f"{file}: bearing_pair.turning_ring = {b.turning_ring!r}: but {b.outer_ring!r} is on the {outer.part} part"
-                if _as_pair(spindle)
-                else f"{where}.outer_ring = {b.outer_ring!r}: is on the {outer.part} part, but of its bodies {spindle.structure.carrier(b.outer_body)!r} "
-                f"{'turns' if b.turning_ring == 'outer' else 'does not turn'}"
-            )
-        if not inner.r[1] < b.pitch_diameter / 2 < outer.r[0]:
-            raise BadInput(
-                f"{where}: pitch_diameter_mm = {b.pitch_diameter * 1e3:g}: the ball centres must lie between the raceways at "
-                f"r_mm = {inner.r[1] * 1e3:g} and {outer.r[0] * 1e3:g}"
-            )
-        gap = outer.r[0] - inner.r[1] - b.ball_diameter
-        if not -0.02 * b.ball_diameter < gap < 0.05 * b.ball_diameter:
-            raise BadInput(
-                f"{where}: the raceways leave {(gap + b.ball_diameter) * 1e3:g} mm for balls of ball_diameter_mm = "
-                f"{b.ball_diameter * 1e3:g}; allowed is -2 % to +5 % of the ball in play"
-            )
+        _check_rings(file, spindle, b, "ball")
         if b.clearance is None:
             continue
         low, high = b.clearance
@@ -126,27 +97,57 @@ def check_bearings(file: Path, spindle: Spindle) -> None:
 def check_rollers(file: Path, spindle: Spindle) -> None:
     """Materials are there, and rings in the section leave room for the rollers, one of them on each part."""
     for b in spindle.roller_bearings:
-        where = f"{file}: bearings.{b.name}"
-        for key, name in (("roller_material", b.roller_material), ("ring_material", b.ring_material)):
-            if name not in spindle.materials:
-                raise BadInput(f"{where}: {key} = {name!r}: allowed are {', '.join(spindle.materials)}")
-        if not b.inner_ring:
-            continue
-        for key, name in (("inner_ring", b.inner_ring), ("outer_ring", b.outer_ring)):
-            if name not in {g.name for g in spindle.regions}:
-                raise BadInput(f"{where}.{key} = {name!r}: names no section region; {_region_instead(spindle, name)}")
-            ring = spindle.region(name)
-            if not ring.z[0] <= b.z <= ring.z[1]:
-                raise BadInput(f"{where}.z_mm = {b.z * 1e3:g}: outside its ring {name!r}, which spans z_mm = {_mm(ring.z)}")
-        inner, outer = spindle.region(b.inner_ring), spindle.region(b.outer_ring)
-        if inner.part == outer.part:
-            raise BadInput(f"{where}: both rings are on the {inner.part} part; one ring must turn")
-        gap = outer.r[0] - inner.r[1] - b.roller_diameter
-        if not -0.02 * b.roller_diameter < gap < 0.05 * b.roller_diameter:
-            raise BadInput(
-                f"{where}: the raceways leave {(gap + b.roller_diameter) * 1e3:g} mm for rollers of roller_diameter_mm = "
-                f"{b.roller_diameter * 1e3:g}; allowed is -2 % to +5 % of the roller in play"
-            )
+        _check_materials(file, spindle, b, "roller")
+        if b.inner_ring:
+            _check_rings(file, spindle, b, "roller")
+
+
+def _check_materials(file: Path, spindle: Spindle, b: Bearing | RollerBearing, element: str) -> None:
+    for key, name in ((f"{element}_material", b.ball_material), ("ring_material", b.ring_material)):
+        if name not in spindle.materials:
+            raise BadInput(f"{file}: bearings.{b.name}: {key} = {name!r}: allowed are {', '.join(spindle.materials)}")
+
+
+def _check_rings(file: Path, spindle: Spindle, b: Bearing | RollerBearing, element: str) -> None:
+    """The rings of a bearing are regions about its height, each of the part that its body belongs to, with room for its balls or rollers between them."""
+    where = f"{file}: bearings.{b.name}"
+    for key, name in (("inner_ring", b.inner_ring), ("outer_ring", b.outer_ring)):
+        if name not in {g.name for g in spindle.regions}:
+            raise BadInput(f"{where}.{key} = {name!r}: names no section region; {_region_instead(spindle, name)}")
+        ring = spindle.region(name)
+        if not ring.z[0] <= b.z <= ring.z[1]:
+            raise BadInput(f"{where}.z_mm = {b.z * 1e3:g}: outside its ring {name!r}, which spans z_mm = {_mm(ring.z)}")
+    _check_materials(file, spindle, b, element)
+    inner, outer = spindle.region(b.inner_ring), spindle.region(b.outer_ring)
+    if inner.part == outer.part:
+        raise BadInput(f"{where}: both rings are on the {inner.part} part; one ring must turn")
+    turning = _turning_ring(spindle, b)
+    if turning and (outer.part == "rotating") != (turning == "outer"):
+        raise BadInput(
+            f"{file}: bearing_pair.turning_ring = {turning!r}: but {b.outer_ring!r} is on the {outer.part} part"
+            if _as_pair(spindle)
+            else f"{where}.outer_ring = {b.outer_ring!r}: is on the {outer.part} part, but of its bodies {spindle.structure.carrier(b.outer_body)!r} "
+            f"{'turns' if turning == 'outer' else 'does not turn'}"
+        )
+    if not inner.r[1] < b.pitch_diameter / 2 < outer.r[0]:
+        raise BadInput(
+            f"{where}: pitch_diameter_mm = {b.pitch_diameter * 1e3:g}: the {element} centres must lie between the raceways at "
+            f"r_mm = {inner.r[1] * 1e3:g} and {outer.r[0] * 1e3:g}"
+        )
+    gap = outer.r[0] - inner.r[1] - b.ball_diameter
+    if not -0.02 * b.ball_diameter < gap < 0.05 * b.ball_diameter:
+        raise BadInput(
+            f"{where}: the raceways leave {(gap + b.ball_diameter) * 1e3:g} mm for {element}s of {element}_diameter_mm = "
+            f"{b.ball_diameter * 1e3:g}; allowed is -2 % to +5 % of the {element} in play"
+        )
+
+
+def _turning_ring(spindle: Spindle, b: Bearing | RollerBearing) -> str:
+    """Which of its rings turns, or the one that turns alone; empty where its bodies do not tell."""
+    if isinstance(b, Bearing):
+        return b.turning_ring
+    turning = [name in {body.name for body in spindle.structure.bodies if body.turns} for name in (b.inner_body, b.outer_body)]
+    return "" if turning[0] == turning[1] else ("inner", "outer")[turning[1]]
 
 
 def check_raceways(file: Path, spindle: Spindle) -> None:
@@ -208,9 +209,8 @@ def check_structure(file: Path, spindle: Spindle) -> None:
     for key, name in mountings:
         if name not in (*names, *shafts, "ground"):
             raise BadInput(f"{file}: {key} = {name!r}: allowed are {', '.join(spindle.structure.parts)}")
+    _check_names(file, spindle)
     for body in structure.bodies:
-        if len(set(names)) < len(names) or body.name == "ground":
-            raise BadInput(f"{file}: structure.bodies: the name {body.name!r} is taken; body names must differ, and 'ground' is the world")
         for name in body.regions:
             if name not in {g.name for g in spindle.regions}:
                 raise BadInput(f"{file}: structure.bodies.{body.name}.regions: {name!r} names no section region; {_region_instead(spindle, name)}")
@@ -248,6 +248,22 @@ def check_structure(file: Path, spindle: Spindle) -> None:
             raise BadInput(f"{file}: hammer_test.hammer_nodes: {node} is no measuring point; allowed are {nodes}")
 
 
+def _check_names(file: Path, spindle: Spindle) -> None:
+    """Bodies and shafts have names that differ, and so have joints and bearings, from each other and from what MuJoCo's model is made of beside them."""
+    structure = spindle.structure
+    taken = {"ground", "world", *(f"{b.name} carrier" for b in structure.bodies if b.turns), *(f"{b.name} sprung ring" for b in spindle.bearings)}
+    for key, name in (*(("bodies", b.name) for b in structure.bodies), *(("shafts", s.name) for s in structure.shafts)):
+        if name in taken:
+            raise BadInput(f"{file}: structure.{key}: the name {name!r} is taken; names of bodies and shafts must differ, and 'ground' is the world")
+        taken.add(name)
+    every = [*(("structure.joints", j.name) for j in structure.joints), *(("bearings", b.name) for b in spindle.all_bearings)]
+    taken = {"loss", *(f"{name}{part}" for _, name in every for part in (".damping", ".remainder"))}
+    for key, name in every:
+        if name in taken:
+            raise BadInput(f"{file}: {key}: the name {name!r} is taken; names of joints and bearings must differ")
+        taken.add(name)
+
+
 def _as_pair(spindle: Spindle) -> bool:
     """Whether the scene tells its bearings as a `bearing_pair`."""
     return "bearing_pair.preload_N" in spindle.provenance
@@ -270,7 +286,7 @@ def _check_mountings(file: Path, spindle: Spindle) -> None:
         wanted = first.outer_body if first.turning_ring == "outer" else first.inner_body
         if not {b.name for b in structure.bodies if structure.carrier(b.name) == structure.carrier(wanted)} == turning:
             raise BadInput(f"{file}: structure.bodies: exactly the body {structure.carrier(wanted)!r} that carries the turning rings must have turns = true")
-    for b in spindle.bearings:
+    for b in spindle.rolling:
         inner, outer = ring_speeds(spindle, b, 1.0)
         if inner == outer:
             raise BadInput(

@@ -153,12 +153,15 @@ where the stiffest mode is one of a shaft's short elements, which no condition s
 
 
 def chosen_step(spindle: Spindle) -> float:
-    """The longest integration step (s) that divides the sampling interval and follows the stiffest mode at the reference state."""
+    """The longest integration step (s) that divides the sampling interval and follows the stiffest mode at the reference state, or as near it as tables of bearing numbers reach."""
     still = {b.name: reference_motion(spindle.reference_temperature) for b in spindle.bearings}
-    chain = rotor_base(spindle, solve(spindle, Condition(spindle.reference_temperature), still))
+    temperature, speed = spindle.reference_temperature, 0.0
+    for b in spindle.linear_bearings:
+        temperature, speed = (float(np.clip(at, told[0], told[-1])) if len(told) > 1 else at for at, told in ((temperature, b.temperature), (speed, b.speed)))
+    chain = rotor_base(spindle, solve(spindle, Condition(temperature, speed), still))
     stiffest = float(np.abs(poles(matrices(chain)).value).max())
     interval = 1 / spindle.hammer.sample_rate
-    return interval / int(np.ceil(interval * stiffest / (SAFE_SHAFT if spindle.structure.shafts else SAFE)))
+    return interval / max(1, int(np.ceil(interval * stiffest / (SAFE_SHAFT if spindle.structure.shafts else SAFE))))
 
 
 def content_hash(spindle: Spindle) -> str:
@@ -311,6 +314,8 @@ def _with_section_inertia(spindle: Spindle) -> Spindle:
     for body in spindle.structure.bodies:
         if body.regions:
             own = [c for c in tiles if c.region in body.regions]
+            if not own:
+                raise BadInput(f"{spindle.file}: structure.bodies.{body.name}.regions = {list(body.regions)}: later regions of the section cover all of them, so that nothing is left for the body to be made of")
             m = mass_properties(own, spindle.regions, dict(spindle.materials))
             body = replace(body, mass=m.mass, inertia=(m.transverse, m.transverse, m.polar), z=m.z)
         bodies.append(body)

@@ -60,7 +60,7 @@ def _clearances(found: Looked) -> Iterator[str]:
 def _massless(found: Looked) -> Iterator[str]:
     """Balls without inertia at a speed at which they have too much of it to be left out."""
     spindle = found.reference.spindle
-    reached = {b.name: spindle.nominal_speed / RPM * b.pitch_diameter / MM for b in spindle.bearings}
+    reached = {b.name: sense.speed_factor(spindle, b, spindle.nominal_speed) for b in spindle.bearings}
     fast = [name for name, factor in reached.items() if factor > HEAVY]
     if fast and not spindle.ball_inertia:
         key = "bearing_pair.ball_inertia" if "bearing_pair.preload_N" in spindle.provenance else "ball_inertia"

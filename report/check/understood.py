@@ -49,7 +49,7 @@ def understood(drawn: Spindle, point: OperatingPoint, catalogue: Sequence[Effect
             {"force_N": list(load.force), "z_mm": _mm(load.z), "body": structure.carrier(load_carrier(spindle, load).name)} for load in spindle.radial_loads
         ],
         "gravity_m_per_s2": list(spindle.gravity),
-        "unbalance_body": structure.carrier(unbalance_carrier(spindle, own).name) if own.unbalance or own.couple_unbalance else None,
+        "unbalance_body": structure.carrier(unbalance_carrier(spindle, own).name) if structure.turns and (own.unbalance or own.couple_unbalance) else None,
         "ball_inertia": spindle.ball_inertia,
         "parts": {
             "turning": [*(s.name for s in structure.shafts if s.turns), *(b.name for b in plain if b.turns)],

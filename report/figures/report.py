@@ -223,7 +223,7 @@ SLENDER = 0.6
 def section(key: str, point: OperatingPoint) -> tuple[str, float]:
     """The axisymmetric section with its materials, and deformed at the point's temperature; also the exaggeration drawn."""
     spindle = point.spindle
-    deformed = field(spindle, point.condition.temperature)
+    deformed = field(spindle, point.regions)
     carried = spindle.region(spindle.bearings[0].outer_ring).part if spindle.bearings else ""  # the bearings move the part with the outer rings
     moved = {p: d.displacement + (_rigid(point, d) if p == carried else 0.0) for p, d in deformed.items()}
     largest = max(float(np.hypot(*u.T).max()) for u in moved.values())

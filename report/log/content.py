@@ -21,7 +21,6 @@ from thermospindle.sim.identification.pairing import by_kind
 from thermospindle.sim.identification.peak import Peak
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.run import Run, as_campaign
-from thermospindle.thermal.expansion import expand
 
 Pair = tuple[int, int]  # response node, hammer node
 FRAMES = 900  # about, of the sweep through the band
@@ -120,7 +119,7 @@ def bearing_series(run: Run, name: str) -> dict[tuple[str, str], Array]:
         }
         return {key: np.array(values) for key, values in of_rollers.items()}
     states = [s.point.state.bearing(name) for s in run.steps]
-    motions = [expand(run.spindle, s.point.condition.temperature)[name] for s in run.steps]
+    motions = [s.point.motions[name] for s in run.steps]
     series = {
         ("angle", "deg"): [np.degrees(s.contact_angle) for s in states],
         ("deformation", "µm"): [1e6 * s.deformation for s in states],

@@ -51,7 +51,7 @@ TURNING = (0.95, 0.62, 0.25)  # tint of what turns, among the mode shapes
 def write_log(run: Run, path: Path) -> None:
     """Write the log of a run, whole or not at all. BadInput if its folder does not exist."""
     content, spindle = shown(run), run.spindle
-    sections = [field(spindle, t) for t in content.temperatures]
+    sections = [field(step.point.spindle, step.point.regions) for step in run.steps]
     factor = drawing.exaggeration(sections, posing.reach(spindle)) if spindle.regions else 1.0
     names = [b.name for b in spindle.bearings] + [b.name for b in spindle.roller_bearings]
     series = {name: bearing_series(run, name) for name in names}

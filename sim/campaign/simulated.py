@@ -65,7 +65,7 @@ def _set_down(row: RowImperfections, balls: int, random: np.random.Generator) ->
 def excited(point: OperatingPoint, imperfections: Imperfections) -> OperatingPoint:
     """The same operating point with other imperfections than its own."""
     quiet = tuple((replace(effect, imperfections=None), values) for effect, values in point.effects)
-    return OperatingPoint(replace(point.spindle, imperfections=imperfections), point.condition, point.state, quiet)
+    return replace(point, spindle=replace(point.spindle, imperfections=imperfections), effects=quiet)
 
 
 def hub_points(spindle: Spindle) -> tuple[Point, ...]:

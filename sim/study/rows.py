@@ -219,5 +219,5 @@ def _variant(of: Cases, index: int) -> Spindle:
 def _unloads(spindle: Spindle, points: Mapping[Condition, OperatingPoint], bearing: str) -> float | None:
     """Temperature (C) between those of a draw at its lowest speed at which a bearing loses contact, None where it does not."""
     slowest = min((abs(c.speed) for c in points), default=0.0)
-    states = [points[c].state for c in sorted(points, key=lambda c: c.temperature) if abs(c.speed) == slowest]
-    return unloads(spindle, states, bearing) if states else None
+    colder = [points[c] for c in sorted(points, key=lambda c: c.temperature) if abs(c.speed) == slowest]
+    return unloads(spindle, colder, bearing) if colder else None

@@ -1,15 +1,19 @@
 """Bearings given by numbers: what a table over temperature and speed may hold."""
 
 import re
+import tomllib
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from tests.conftest import ROOT
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.machine import Condition
 from thermospindle.model.scene.bearing_numbers import Numbers
-from thermospindle.model.scene.reading import load
+from thermospindle.model.scene.reading import build, load
+from thermospindle.model.units import RPM
+from thermospindle.sim.operating import operating_point
 
 HEADER = "temperature_C,speed_rpm,radial_stiffness_N_per_m,axial_stiffness_N_per_m"
 
@@ -94,3 +98,23 @@ def test_a_table_that_is_none_is_told_with_the_scene_and_its_key(tmp_path, table
     with pytest.raises(BadInput) as error:
         load(tmp_path)
     assert str(error.value).startswith(f"{tmp_path / 'spindle.toml'}: bearings.left.numbers.table = {table!r}: {said.format(tmp_path / table)}")
+
+
+def test_a_table_of_turning_the_other_way_is_that_of_its_speeds(tmp_path):
+    _, speeds, stiffness = grid(tmp_path, row="20,-1500,3e7,0\n20,0,2e7,0")
+    assert speeds == pytest.approx((0.0, 50 * np.pi))
+    assert [k[0] for k in np.reshape(stiffness, (2, 25))] == [2e7, 3e7]
+    with pytest.raises(BadInput, match="line 3: 20 C and 1500 rpm stand twice"):
+        grid(tmp_path, row="20,-1500,3e7,0\n20,1500,2e7,0")
+
+
+def test_a_table_that_begins_above_rest_serves_its_own_speeds(tmp_path):
+    """The integration step, which nobody told, was asked for at rest: neither modes at 3000 rpm nor `check` could be had."""
+    file = ROOT / "scenes" / "templates" / "rotor.toml"
+    raw = tomllib.loads(file.read_text(encoding="utf-8"))
+    (tmp_path / "b.csv").write_text(f"{HEADER}\n25,1000,2e7,0\n60,1000,2e7,0\n25,6000,1e7,0\n60,6000,1e7,0\n", encoding="utf-8")
+    raw["bearings"]["right"]["numbers"] = {"table": "b.csv", "damping_ratio": 0.02}
+    spindle = build(raw, tmp_path / "spindle.toml")
+    with pytest.raises(OutsideRange, match="was asked at 0 rpm"):
+        operating_point(spindle, Condition(40.0))
+    assert operating_point(spindle, Condition(40.0, 3000 * RPM)).modes

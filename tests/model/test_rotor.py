@@ -1,5 +1,6 @@
 """The rotor-base chain: gyroscopic closed forms by matrices and by MuJoCo, FRFs, energies, the reference spindle's modes."""
 
+import tomllib
 from dataclasses import replace
 
 import mujoco
@@ -19,7 +20,7 @@ from thermospindle.model.rotor.chain import Element, Matrices, RotorBase, matric
 from thermospindle.model.rotor.chain import sprung as on_a_spring
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.rotor.modes import frf, group_energy, modes, point_rows, poles
-from thermospindle.model.scene.reading import load
+from thermospindle.model.scene.reading import build, load
 from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
@@ -179,6 +180,17 @@ def test_rows_of_a_flexible_shaft_are_those_of_its_beam_model(rpm):
     scale = np.sqrt(np.outer(np.diag(own.stiffness), np.diag(own.stiffness)))
     assert np.abs((found.stiffness - own.stiffness) / scale).max() < 1e-6
     assert np.abs(found.mass - own.mass).max() < 1e-9 * own.mass.max()
+
+
+@pytest.mark.parametrize("beam", ["timoshenko", "euler-bernoulli"])
+def test_short_elements_without_rotary_inertia_have_none_in_mujoco(beam):
+    """The least that MuJoCo wants of a body was there in directions that move, too: five times what the nodes of 15 mm have."""
+    file = ROOT / "scenes" / "templates" / "rotor.toml"
+    raw = tomllib.loads(file.read_text(encoding="utf-8"))
+    raw["shafts"][0] |= {"beam": beam, "longest_element_mm": 15.0}
+    point = operating_point(build(raw, file), Condition(20.0, 3000 * RPM))
+    own, found = matrices(point.chain), mjcf.linearise(point.model)
+    assert np.diag(found.mass) == pytest.approx(np.diag(own.mass), rel=1e-9)
 
 
 @pytest.mark.parametrize("lower", [0.0, -0.5, -0.62], ids=["8 N", "1.8 N", "0.7 N"])

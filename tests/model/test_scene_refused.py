@@ -2,13 +2,14 @@
 
 import copy
 import re
+import tomllib
 
 import pytest
 
 from tests.conftest import ROOT
 from tests.model.conftest import FILE, named
 from thermospindle.model.errors import BadInput
-from thermospindle.model.scene.reading import build, load
+from thermospindle.model.scene.reading import build, load, shipped_rows
 
 
 def region(raw, name):
@@ -21,6 +22,12 @@ def by_numbers(raw, tilt, polar):
     hub.update(mass_kg=0.026, z_mm=10.0, tilt_inertia_kg_m2=[tilt, tilt], origin="assumed")
     if polar is not None:
         hub.update(polar_inertia_kg_m2=polar)
+
+
+def of_a_hidden_region(raw):
+    raw["section"]["regions"].insert(0, region(raw, "sleeve") | {"name": "hidden", "r_mm": [6.5, 7.5], "z_mm": [11.0, 19.0]})
+    raw["structure"]["bodies"].append({"name": "lump", "regions": ["hidden"], "moves": ["x", "y", "z", "tilt_x", "tilt_y"], "turns": False})
+    raw["structure"]["joints"].append(named(raw["structure"]["joints"], "mount") | {"name": "of lump", "between": ["ground", "lump"]})
 
 
 def one_tube_too_wide(raw):
@@ -115,6 +122,11 @@ REFUSED = [
     ("oil-thin", lambda r: r["thermal"]["friction"].update(kinematic_viscosity_mm2_per_s=0.2), "kinematic_viscosity_mm2_per_s: 0.2 mm2/s", "allows 0.35 and more"),
     ("joint-twice", lambda r: named(r["structure"]["joints"], "mount").update(between=["base", "base"]), "structure.joints.mount.between: 'base' stands twice", "two bodies"),
     ("body-twice", lambda r: named(r["structure"]["bodies"], "seat").update(name="base"), "'base' is taken", "must differ"),
+    ("world", lambda r: named(r["structure"]["bodies"], "seat").update(name="world"), "structure.bodies: the name 'world' is taken", "must differ"),
+    ("carrier", lambda r: named(r["structure"]["bodies"], "seat").update(name="hub carrier"), "the name 'hub carrier' is taken", "must differ"),
+    ("two-joints", lambda r: named(r["structure"]["joints"], "flange").update(name="plate"), "structure.joints: the name 'plate' is taken", "must differ"),
+    ("joint-like-bearing", lambda r: named(r["structure"]["joints"], "flange").update(name="upper"), "bearings: the name 'upper' is taken", "joints and bearings must differ"),
+    ("body-without-section", of_a_hidden_region, "structure.bodies.lump.regions = ['hidden']", "nothing is left"),
     (
         "no-inertia",
         lambda r: named(r["structure"]["bodies"], "seat").pop("tilt_inertia_kg_m2"),
@@ -160,3 +172,68 @@ def test_refused(raw, spoil, key, allowed):
     assert key in message
     assert allowed in message
     assert "\n" not in message
+
+
+def scene(name, raw):
+    """A shipped scene or template built from its tables after `raw` has changed them."""
+    file = ROOT / "scenes" / name
+    tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    raw(tables)
+    return build(tables, file)
+
+
+def test_a_body_named_like_a_shaft_is_refused():
+    """Joints and points that named the body went to the shaft, and the body floated."""
+
+    def renamed(raw):
+        raw["structure"]["bodies"][0]["name"] = "shaft"
+        raw["structure"]["joints"][0]["between"] = ["ground", "shaft"]
+        for p in raw["measuring"]["points"]:
+            p["body"] = "shaft"
+
+    with pytest.raises(BadInput, match=r"structure\.shafts: the name 'shaft' is taken; names of bodies and shafts must differ"):
+        scene("templates/rotor.toml", renamed)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"pitch_diameter_mm": 200.0}, "bearings.front1: pitch_diameter_mm = 200: the roller centres must lie between the raceways at r_mm = 41 and 50"),
+        ({"roller_diameter_mm": 9.6}, "leave 9 mm for rollers of roller_diameter_mm = 9.6"),
+    ],
+)
+def test_rollers_that_do_not_fit_their_rings_are_refused(change, said):
+    name = "NN3014ASK"
+    with pytest.raises(BadInput, match=re.escape(said)):
+        scene("tailstock/spindle.toml", lambda raw: raw.update(roller_rows={name: shipped_rows()["roller_rows"][name] | change}))
+
+
+@pytest.mark.parametrize(
+    ("bodies", "said"),
+    [
+        (("barrel", "spindle"), "outer_ring = 'front outer ring': is on the stationary part, but of its bodies 'spindle' turns"),
+        (("ground", "barrel"), "bearings.front1: its rings, on 'ground' and 'barrel', turn alike; one of the two must have turns = true"),
+    ],
+)
+def test_roller_rings_on_the_wrong_bodies_are_refused(bodies, said):
+    with pytest.raises(BadInput, match=re.escape(said)):
+        scene("tailstock/spindle.toml", lambda raw: raw["bearings"]["front1"].update(zip(("inner_body", "outer_body"), bodies, strict=True)))
+
+
+def test_a_load_on_two_shafts_is_refused():
+    """Of two shafts in a housing that is the ground each had the whole load."""
+
+    def two(raw):
+        first = raw["shafts"][0]
+        length = sum(piece[-1] for piece in first["outer_mm"])
+        told = {k: v for k, v in first.items() if k in ("origin", "source", "name", "material", "role", "turns", "damping_ratio")}
+        raw["shafts"] = [told | {"outer_mm": [[70.0, 200.0]], "start_z_mm": 0.0}, told | {"name": "second", "outer_mm": [[60.0, length - 210.0]], "start_z_mm": 210.0}, *raw["shafts"][1:]]
+        sets = {k: v for k, v in raw["sets"]["spindle"].items() if k in ("origin", "source")} | {"preload_N": 450.0, "preload_kind": "rigid"}
+        raw["sets"] = {end: sets | {"bearings": [f"{end}1", f"{end}2"]} for end in ("front", "rear")}
+        raw["bearings"] |= {name: b | {"inner_body": "second" if name.startswith("rear") else "spindle", "outer_body": "ground", "sense": "-z" if name.endswith("1") else "+z"} for name, b in raw["bearings"].items()}
+        raw["measuring"]["points"] = [p for p in raw["measuring"]["points"] if p["body"] != "spindle" or p["position_mm"][2] < 200.0]
+        raw.pop("imperfections", None)
+
+    scene("templates/machine-tool.toml", two)
+    with pytest.raises(BadInput, match=r"axial_load_N = 100: there is no one part that carries all inner rings, .* rows that share no part are front1 and front2; rear1 and rear2"):
+        scene("templates/machine-tool.toml", lambda raw: two(raw) or raw.update(axial_load_N=100.0))

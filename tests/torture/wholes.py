@@ -158,7 +158,8 @@ def stiffness() -> bytes:
     spindle = load(SCENE)
     rings = {b.name: reference_motion(20.0) for b in spindle.bearings}
     with TemporaryDirectory() as place:
-        write_table(tabulate([[solve(spindle, Condition(t, w), rings) for w in (0.0, 700.0)] for t in (20.0, 40.0, 60.0)], {}, {}), Path(place) / "table.csv")
+        grid = (20.0, 40.0, 60.0), (0.0, 700.0)
+        write_table(tabulate(*grid, [[solve(spindle, Condition(t, w), rings) for w in grid[1]] for t in grid[0]], {}, {}), Path(place) / "table.csv")
         return (Path(place) / "table.csv").read_bytes()
 
 

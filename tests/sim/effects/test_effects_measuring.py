@@ -1,20 +1,28 @@
 """Effects on the measuring chain, each against something it did not produce."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from tests.conftest import ROOT
 from tests.effect_points import RUNNING, at
-from thermospindle.model.machine import Condition
+from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import frf, point_rows, poles
 from thermospindle.model.scene.reading import load
+from thermospindle.report.log.content import bearing_series
 from thermospindle.sim.campaign.beside import measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.effects import by_name
 from thermospindle.sim.effects.bearing import bond_softening
 from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, thermometer_error, window_damping
+from thermospindle.sim.hammer.test import impact_tests
 from thermospindle.sim.identification.frf import Frf
-from thermospindle.sim.operating import operating_point
+from thermospindle.sim.operating import operating_point, stiffness_table
+from thermospindle.sim.run import as_campaign
+from thermospindle.thermal.expansion import field
 
 LINES = np.linspace(500.0, 2500.0, 41)
 
@@ -50,7 +58,35 @@ def test_a_thermometer_error_is_another_temperature(spindle):
         for own, there in ((read.linear.stiffness, true.linear.stiffness), (read.linear.damping, true.linear.damping)):
             assert np.array_equal(own, there)
         assert read.state.bearings[0].preload == true.state.bearings[0].preload != operating_point(spindle, Condition(45.0), others).state.bearings[0].preload
-        assert read.condition == true.condition
+        assert read.condition == Condition(45.0)  # as the test says
+        assert read.state.condition == true.state.condition == true.condition
+
+
+def test_results_of_a_wrong_thermometer_are_of_what_it_reads(spindle):
+    """Tables, where a bearing unloads, and virtual tests were labelled with the temperature that it hides, or had the error twice."""
+    wrong = replace(spindle, effects=(Addition("thermometer_error", {"offset": 20.0}),))
+    true, read = stiffness_table(spindle, [100.0, 140.0, 180.0]), stiffness_table(wrong, [80.0, 120.0, 160.0])
+    assert read.temperature.tolist() == [80.0, 120.0, 160.0]
+    assert read.values["upper"]["preload_N"] == pytest.approx(true.values["upper"]["preload_N"], rel=1e-12)
+    assert read.unloads["upper"] == pytest.approx(true.unloads["upper"] - 20.0, abs=2e-3)
+    point = operating_point(wrong, Condition(40.0))
+    step = SimpleNamespace(point=point, test=impact_tests([point])[0])
+    (made,) = as_campaign(SimpleNamespace(spindle=wrong, steps=[step]), "wrong").tests
+    assert (made.id, made.temperature) == ("T40_n0", 40.0)
+
+
+@pytest.mark.parametrize(("effect", "gap"), [("expansion_mismatch", "ring gap r"), ("soak_lag", "ring gap z")])
+def test_a_log_shows_the_rings_as_effects_move_them(spindle, effect, gap):
+    """Beside the preload with effects were gaps without them."""
+    gaps = []
+    for present in ((), (Addition(effect, by_name(effect).typical()),)):
+        with_it = replace(spindle, effects=present)
+        point = operating_point(with_it, Condition(60.0, soak_time=600.0))
+        gaps.append(bearing_series(SimpleNamespace(spindle=with_it, steps=[SimpleNamespace(point=point)]), "lower")[gap, "µm"][0])
+        moved = [field(point.spindle, point.regions)[part].displacement for part in ("stationary", "rotating")]
+        gaps.append(float(np.ptp(moved[1][:, 0])))
+    assert abs(gaps[2] / gaps[0] - 1) > 0.02
+    assert abs(gaps[3] / gaps[1] - 1) > 0.02
 
 
 def test_one_channel_alone_is_late_or_wrong(spindle):

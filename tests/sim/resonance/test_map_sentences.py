@@ -74,7 +74,7 @@ def test_a_warning_of_every_bearing_is_one(spindle):
     assert "in the front, rear and third bearings; ball" in merged
     merged, alone = of_conditions(replace(named, bearings=(*named.bearings, other)), [Condition(20.0, 400_000 * RPM)])
     assert "in the front, rear and third bearings; ball" in merged
-    assert "n dm of 1.44e+07 mm rev/min in the large bearing; ball bearings end at about 2.5e+06" in alone
+    assert "n dm of 1.44e+07 mm rev/min in the large bearing; rolling bearings end at about 2.5e+06" in alone
 
 
 def test_a_shaft_that_its_own_rotation_tears_is_doubted():
