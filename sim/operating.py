@@ -23,8 +23,10 @@ from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.beam import at_temperature
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base
 from thermospindle.model.rotor.distributed import spread
+from thermospindle.model.rotor.frf import frf, point_rows
 from thermospindle.model.rotor.loaded import loaded
-from thermospindle.model.rotor.modes import Between, Mode, frf, modes, point_rows
+from thermospindle.model.rotor.modes import Mode, modes
+from thermospindle.model.rotor.poles import Between
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.sensors import with_sensors
 from thermospindle.model.types import Array, ComplexArray

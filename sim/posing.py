@@ -11,9 +11,10 @@ import numpy as np
 
 from thermospindle.model.bearing.kinematics import row_kinematics
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.look import RegionMesh, plate_meshes, region_meshes, shaft_meshes
-from thermospindle.model.rotor.modes import Mode, frf, point_rows
-from thermospindle.model.rotor.shaft_look import extent
+from thermospindle.model.rotor.frf import frf, point_rows
+from thermospindle.model.rotor.look.meshes import RegionMesh, plate_meshes, region_meshes, shaft_meshes
+from thermospindle.model.rotor.look.shafts import extent
+from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import TO_MM

@@ -21,7 +21,8 @@ from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase, matrices, motion_rows
-from thermospindle.model.rotor.modes import frf, modes
+from thermospindle.model.rotor.frf import frf
+from thermospindle.model.rotor.modes import modes
 from thermospindle.model.rotor.static import rated_chain
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM

@@ -249,5 +249,5 @@ def _answer(question: Elastic, start: PartMesh) -> tuple[Response, Convergence]:
 
 def forget() -> None:
     """Drop what this process has kept, so that it reads from disk or computes again as a new one would."""
-    for kept in (_kept, _space, _response, _gains, _at_reference):
-        kept.cache_clear()
+    for cached in (_kept, _space, _response, _gains, _at_reference):
+        cached.cache_clear()

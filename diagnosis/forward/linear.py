@@ -12,7 +12,7 @@ import numpy as np
 from thermospindle.diagnosis.parameters.masses import MassTerm
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import Between
+from thermospindle.model.rotor.poles import Between
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import Measurement

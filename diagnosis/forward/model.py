@@ -29,7 +29,7 @@ from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, losses, matrices
-from thermospindle.model.rotor.modes import Between
+from thermospindle.model.rotor.poles import Between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, with_material

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from thermospindle.model.rotor.modes import Poles
+from thermospindle.model.rotor.poles import Poles
 from thermospindle.model.types import Array, ComplexArray, Integers
 
 CLOSE = 1e-5  # times 1 / T, below which two poles' difference is their derivative

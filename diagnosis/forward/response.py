@@ -13,7 +13,7 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.linear import BY_LAW, Linear, Pairs, Products, as_dampers
 from thermospindle.diagnosis.forward.record import RecordEnd
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import LARGE, Poles, poles
+from thermospindle.model.rotor.poles import LARGE, Poles, poles
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification.frf import POWER

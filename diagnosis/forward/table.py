@@ -10,7 +10,8 @@ from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward.linear import Linear, Products, shown
 from thermospindle.diagnosis.forward.shapes import ShapeBeside
 from thermospindle.model.errors import listed
-from thermospindle.model.rotor.modes import Poles, kinds, oscillating, poles_below, stiffest_of, vectors_below, with_mass_between
+from thermospindle.model.rotor.modes import kinds
+from thermospindle.model.rotor.poles import Poles, oscillating, poles_below, stiffest_of, vectors_below, with_mass_between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import MIXING, ModeSet

@@ -24,7 +24,8 @@ from thermospindle.diagnosis.parameters.mechanism import size_covariance
 from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
-from thermospindle.model.rotor.modes import kinds, poles_below
+from thermospindle.model.rotor.modes import kinds
+from thermospindle.model.rotor.poles import poles_below
 from thermospindle.model.types import Array
 
 READING = 5e-5  # relative error of a frequency read from a hammer test

@@ -11,7 +11,8 @@ from thermospindle.diagnosis.forward.linear import Linear, shown
 from thermospindle.diagnosis.forward.model import Applied
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.rotor.modes import kinds, oscillating, stiffest_of, with_mass_between
+from thermospindle.model.rotor.modes import kinds
+from thermospindle.model.rotor.poles import oscillating, stiffest_of, with_mass_between
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.identification.pairing import ModeSet
 from thermospindle.sim.operating import mass_between, operating_point

@@ -21,7 +21,7 @@ from thermospindle.model.bearing.springs import ball_springs, tangent
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Element, Matrices, RotorBase, element_rows, lost, matrices, point_row, rotor_base
 from thermospindle.model.rotor.elements import ELEMENTS
-from thermospindle.model.rotor.look import dress
+from thermospindle.model.rotor.look.dress import dress
 from thermospindle.model.types import Array
 
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "tilt_x": (1, 0, 0), "tilt_y": (0, 1, 0)}

@@ -31,7 +31,7 @@ from thermospindle.model.files.formats import KEY, SCENE, migrated
 from thermospindle.model.machine import Bearing, Condition, Provenance, Spindle
 from thermospindle.model.rotor.beam import with_shafts
 from thermospindle.model.rotor.chain import matrices, rotor_base
-from thermospindle.model.rotor.modes import poles
+from thermospindle.model.rotor.poles import poles
 from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.scene import form as scene_file
 from thermospindle.model.scene.checks import check_bearings, check_raceways, check_rollers, check_section, check_structure, constant

@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.model.carrier import UNBALANCE, load_carrier, turning_parts, unbalanced
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import PARTS, Point, Spindle
-from thermospindle.model.rotor.modes import lost_to_rounding, poles_below
+from thermospindle.model.rotor.poles import lost_to_rounding, poles_below
 from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft

@@ -12,7 +12,9 @@ from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.bearing.roller import RollerState, cage_spread
 from thermospindle.model.carrier import load_carrier, unbalance_carrier
 from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
-from thermospindle.model.rotor.modes import Mode, frf, poles
+from thermospindle.model.rotor.frf import frf
+from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.rotor.poles import poles
 from thermospindle.model.shaft import THEORIES, Shaft
 from thermospindle.model.structure import Body
 from thermospindle.model.units import HERTZ, in_rpm

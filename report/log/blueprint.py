@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import rerun.blueprint as rrb
 
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.shaft_look import extent
+from thermospindle.model.rotor.look.shafts import extent
 from thermospindle.model.units import TO_MM
 from thermospindle.report.log.content import NO_COHERENCE, Pair, Shown
 from thermospindle.report.log.pictures import view

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.whole import whole
-from thermospindle.model.rotor.look import RegionMesh
+from thermospindle.model.rotor.look.meshes import RegionMesh
 from thermospindle.model.types import Array
 from thermospindle.model.units import TO_MM
 from thermospindle.report.log.drawing import light

@@ -22,7 +22,8 @@ from markupsafe import Markup, escape
 
 from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.modes import frf, group_energy, point_rows
+from thermospindle.model.rotor.frf import frf, point_rows
+from thermospindle.model.rotor.modes import group_energy
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.units import RPM
 from thermospindle.report.figures import report as plots

@@ -13,10 +13,11 @@ import numpy as np
 
 from thermospindle.model.machine import PARTS, Spindle
 from thermospindle.model.rotor.chain import RotorBase
-from thermospindle.model.rotor.look import PLATE, SHADES, colour, plate, region_bodies, region_colours
+from thermospindle.model.rotor.look.colours import PLATE, SHADES, colour, region_bodies, region_colours
+from thermospindle.model.rotor.look.meshes import plate
+from thermospindle.model.rotor.look.shafts import drawn_by_shaft, slices
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.rotor.section import Cell, cells
-from thermospindle.model.rotor.shaft_look import drawn_by_shaft, slices
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray
 

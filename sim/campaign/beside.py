@@ -11,7 +11,7 @@ import numpy as np
 from thermospindle.model import sense
 from thermospindle.model.errors import BadInput, listed
 from thermospindle.model.machine import Condition, Point, Spindle
-from thermospindle.model.rotor.modes import Between
+from thermospindle.model.rotor.poles import Between
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import MM

@@ -11,7 +11,8 @@ import numpy as np
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase, matrices
-from thermospindle.model.rotor.modes import frf, modes
+from thermospindle.model.rotor.frf import frf
+from thermospindle.model.rotor.modes import modes
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.effect import Effect, Values

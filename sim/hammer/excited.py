@@ -9,7 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thermospindle.model.rotor.modes import Mode, point_rows, poles
+from thermospindle.model.rotor.frf import point_rows
+from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.rotor.poles import poles
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint

@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from thermospindle.model.machine import HammerTest
-from thermospindle.model.rotor.modes import point_rows
+from thermospindle.model.rotor.frf import point_rows
 from thermospindle.model.rotor.reduced import Reduced, reduced
 from thermospindle.model.types import Array
 from thermospindle.sim.hammer.pulse import Hit, force

@@ -24,7 +24,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import HammerTest, Spindle
 from thermospindle.model.parallel import cores
 from thermospindle.model.rotor.elements import LINEAR, REDUCED
-from thermospindle.model.rotor.modes import LARGE
+from thermospindle.model.rotor.poles import LARGE
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Measurement
 from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from thermospindle.model.rotor.modes import point_rows
+from thermospindle.model.rotor.frf import point_rows
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.campaign.modes import ModeRow

@@ -8,7 +8,8 @@ import numpy as np
 
 from thermospindle.model.carrier import turning_parts, unbalance_carrier
 from thermospindle.model.rotor.chain import motion_rows
-from thermospindle.model.rotor.modes import Mode, Poles, poles
+from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.rotor.poles import Poles, poles
 from thermospindle.model.types import Array
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.resonance.point import UNIT_UNBALANCE, orbit

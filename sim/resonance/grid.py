@@ -14,7 +14,8 @@ from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.rotor.modes import LARGE, Mode, modes
+from thermospindle.model.rotor.modes import Mode, modes
+from thermospindle.model.rotor.poles import LARGE
 from thermospindle.model.types import Array
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import operating_point

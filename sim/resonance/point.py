@@ -13,7 +13,8 @@ from thermospindle.model.built.imperfections import Imperfections, RowImperfecti
 from thermospindle.model.carrier import named, unbalanced
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.rotor.modes import Mode, Poles, poles
+from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.rotor.poles import Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Harmonics, harmonics, response

@@ -43,7 +43,7 @@ from thermospindle.model.bearing.pair import BearingState, check_centred
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.carrier import unbalance_carrier
 from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows
-from thermospindle.model.rotor.modes import LARGE, Poles, poles
+from thermospindle.model.rotor.poles import LARGE, Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.rollers import free_displacements as rollers_displaced

@@ -24,7 +24,7 @@ from thermospindle.model.bearing.pair import BearingState, PairState, bearing_st
 from thermospindle.model.bearing.row import reference_motion, row_at
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, motion_rows, rotor_base
-from thermospindle.model.rotor.modes import Poles, poles
+from thermospindle.model.rotor.poles import Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.thermal.expansion import expand
 from thermospindle.thermal.influence import TOLERANCE

@@ -21,7 +21,8 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import BearingSet, Condition
 from thermospindle.model.rotor.beam import with_theory
 from thermospindle.model.rotor.chain import matrices, motion_rows
-from thermospindle.model.rotor.modes import frf, modes
+from thermospindle.model.rotor.frf import frf
+from thermospindle.model.rotor.modes import modes
 from thermospindle.model.rotor.static import rated_chain, static
 from thermospindle.model.scene.reading import build, load, loaded_angle, with_shipped_rows
 from thermospindle.model.units import RPM

@@ -15,7 +15,7 @@ from thermospindle.cli import main
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.beam import with_theory
 from thermospindle.model.rotor.chain import matrices, motion_rows
-from thermospindle.model.rotor.modes import poles_below
+from thermospindle.model.rotor.poles import poles_below
 from thermospindle.model.rotor.static import rated_chain
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM

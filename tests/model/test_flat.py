@@ -12,8 +12,9 @@ from tests.literature.test_rotors import chain
 from thermospindle.model.errors import BadInput
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.distributed import spread
-from thermospindle.model.rotor.look import shaft_meshes
-from thermospindle.model.rotor.modes import modes, poles_below
+from thermospindle.model.rotor.look.meshes import shaft_meshes
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.rotor.poles import poles_below
 from thermospindle.model.scene.reading import build
 from thermospindle.model.units import RPM
 from thermospindle.report.check.odd import off

@@ -14,9 +14,11 @@ from tests.conftest import ROOT
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.machine import Condition
-from thermospindle.model.rotor import look, mjcf
+from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import rotor_base
 from thermospindle.model.rotor.elements import ELEMENTS
+from thermospindle.model.rotor.look import colours, dress
+from thermospindle.model.rotor.look import meshes as solids
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.rotor.section import Cell, cells
 from thermospindle.model.scene.reading import load
@@ -45,7 +47,7 @@ def assert_closed(triangles) -> None:
 
 @pytest.fixture(scope="module")
 def meshes(spindle):
-    return look.region_meshes(spindle)
+    return solids.region_meshes(spindle)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +58,7 @@ def spinning(spindle):
 
 def dressed(spindle, state, element="linear"):
     out = mjcf.spec(spindle, state, element)
-    look.dress(out, spindle, state)
+    dress.dress(out, spindle, state)
     return out
 
 
@@ -64,9 +66,9 @@ def dressed(spindle, state, element="linear"):
 
 
 @pytest.mark.parametrize("tiles", [ROUND, FRAME, FRAME[:1]], ids=["on-the-axis", "with-a-hollow", "ring"])
-@pytest.mark.parametrize("angles", [look.CUT, (0.1, 0.2)], ids=["cut-away", "sliver"])
+@pytest.mark.parametrize("angles", [solids.CUT, (0.1, 0.2)], ids=["cut-away", "sliver"])
 def test_revolved_rectangles_are_closed_and_have_their_volume(tiles, angles):
-    vertices, triangles, patches = look.revolve(tiles, *angles)
+    vertices, triangles, patches = solids.revolve(tiles, *angles)
     assert_closed(triangles)
     assert volume(vertices, triangles) == pytest.approx((angles[1] - angles[0]) / (2 * np.pi) * ring_volume(tiles), rel=1e-12)
     assert len(patches) == len(triangles)
@@ -75,7 +77,7 @@ def test_revolved_rectangles_are_closed_and_have_their_volume(tiles, angles):
 def test_splitting_a_rectangle_leaves_its_mesh_alone():
     """Lines that other regions draw through a region do not add triangles to it."""
     halves = [Cell("a", (1.0, 2.0), (0.0, 0.3)), Cell("a", (1.0, 2.0), (0.3, 1.0))]
-    for one, two in zip(look.revolve([Cell("a", (1.0, 2.0), (0.0, 1.0))]), look.revolve(halves), strict=True):
+    for one, two in zip(solids.revolve([Cell("a", (1.0, 2.0), (0.0, 1.0))]), solids.revolve(halves), strict=True):
         np.testing.assert_array_equal(one, two)
 
 
@@ -97,7 +99,7 @@ def test_meshes_weigh_what_their_body_weighs(spindle, meshes, body):
 
 
 def test_the_quarter_cut_away_is_empty_and_no_point_lies_in_it(spindle, meshes):
-    gap = look.CUT[1], look.CUT[0] + 2 * np.pi
+    gap = solids.CUT[1], solids.CUT[0] + 2 * np.pi
     everything = np.concatenate([m.vertices for m in meshes])
     everything = everything[np.hypot(everything[:, 0], everything[:, 1]) > 0]
     for x, y, _ in [*everything, *(p.position for p in spindle.points)]:
@@ -111,7 +113,7 @@ def test_shading_is_smooth_round_the_axis_and_sharp_elsewhere(meshes):
         a, b, c = (vertices[triangles[:, i]] for i in range(3))
         flat = np.cross(b - a, c - a)
         flat /= np.linalg.norm(flat, axis=1, keepdims=True)
-        assert np.min(np.einsum("tci,ti->tc", normals[triangles], flat)) > np.cos(look.STEP)
+        assert np.min(np.einsum("tci,ti->tc", normals[triangles], flat)) > np.cos(solids.STEP)
         assert volume(vertices, triangles) == pytest.approx(volume(mesh.vertices, mesh.triangles))
         upright = np.abs(flat[:, 2]) < 0.5
         assert np.all(normals[triangles[upright], 2] == 0)
@@ -121,27 +123,27 @@ def test_shading_is_smooth_round_the_axis_and_sharp_elsewhere(meshes):
 
 
 def test_regions_hang_on_the_body_they_move_with(spindle):
-    hosts = look.region_bodies(spindle)
+    hosts = colours.region_bodies(spindle)
     assert all(hosts[region] == body.name for body in spindle.structure.bodies for region in body.regions)
     assert hosts["base disc"] == hosts["flange boss"] == "seat"  # the shaft's flange joins it to the seat
-    assert [m.body for m in look.plate_meshes(spindle)] == ["base"]
-    assert [m.body for m in look.stripe_meshes(spindle)] == ["hub"]
+    assert [m.body for m in solids.plate_meshes(spindle)] == ["base"]
+    assert [m.body for m in solids.stripe_meshes(spindle)] == ["hub"]
 
 
 def test_without_a_seat_regions_are_part_of_the_body_they_touch(spindle):
     structure = replace(spindle.structure, joints=tuple(j for j in spindle.structure.joints if j.name != "flange"))
-    hosts = look.region_bodies(replace(spindle, structure=structure))
+    hosts = colours.region_bodies(replace(spindle, structure=structure))
     assert hosts["base disc"] == hosts["flange boss"] == "shaft"
 
 
 def test_regions_that_touch_nothing_stay_with_the_rings_of_their_part(spindle):
     far = [replace(spindle.regions[0], name=part, part=part, r=(0.1, 0.2)) for part in ("stationary", "rotating")]
-    hosts = look.region_bodies(replace(spindle, regions=(*spindle.regions, *far)))
+    hosts = colours.region_bodies(replace(spindle, regions=(*spindle.regions, *far)))
     assert (hosts["stationary"], hosts["rotating"]) == ("shaft", "hub")
 
 
 def test_the_plate_holds_its_points_on_top(spindle):
-    (plate,) = look.plate_meshes(spindle)
+    (plate,) = solids.plate_meshes(spindle)
     assert_closed(plate.triangles)
     x, y, z = spindle.point(7).position
     radius = np.hypot(*plate.vertices[:, :2].T)
@@ -152,7 +154,7 @@ def test_the_plate_holds_its_points_on_top(spindle):
 def test_a_body_whose_points_lie_on_the_axis_is_a_disc_of_its_inertia():
     """A wheel or a collet hit in its middle: a ring as wide as its points would have no width, and MuJoCo refuses it."""
     wheeled = load(ROOT / "scenes" / "templates" / "grinding.toml")
-    (plate,) = (m for m in look.plate_meshes(wheeled) if m.body == "wheel")
+    (plate,) = (m for m in solids.plate_meshes(wheeled) if m.body == "wheel")
     assert_closed(plate.triangles)
     body = wheeled.structure.body("wheel")
     assert np.hypot(*plate.vertices[:, :2].T).max() == pytest.approx(np.sqrt(2 * body.inertia[2] / body.mass), rel=0.01)
@@ -172,18 +174,18 @@ def test_touching_regions_of_one_material_differ_in_shade(spindle, meshes):
 
 
 def test_a_material_without_a_colour_gets_one_of_its_own():
-    assert look.colour("zirconia") == look.colour("zirconia") != look.colour("brass")
-    assert look.colour("steel") == look.COLOURS["steel"]
+    assert colours.colour("zirconia") == colours.colour("zirconia") != colours.colour("brass")
+    assert colours.colour("steel") == colours.COLOURS["steel"]
 
 
 # ---------------------------------------------------------------- the MuJoCo model
 
 
 def test_enumerations_are_those_of_mujoco():
-    assert mujoco.mjtGeom.mjGEOM_SPHERE == look.SPHERE
-    assert mujoco.mjtGeom.mjGEOM_MESH == look.MESH
-    assert mujoco.mjtTexture.mjTEXTURE_SKYBOX == look.SKYBOX
-    assert mujoco.mjtBuiltin.mjBUILTIN_GRADIENT == look.GRADIENT
+    assert mujoco.mjtGeom.mjGEOM_SPHERE == dress.SPHERE
+    assert mujoco.mjtGeom.mjGEOM_MESH == dress.MESH
+    assert mujoco.mjtTexture.mjTEXTURE_SKYBOX == dress.SKYBOX
+    assert mujoco.mjtBuiltin.mjBUILTIN_GRADIENT == dress.GRADIENT
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
@@ -248,8 +250,8 @@ def test_balls_that_lost_contact_are_shown_in_another_colour(spindle, cold):
     lower, upper = cold.bearings
     state = replace(cold, bearings=(lower, replace(upper, in_contact=False)))
     model = dressed(spindle, state).compile()
-    np.testing.assert_allclose(model.geom("lower ball 0").rgba[:3], look.BALL, rtol=1e-6)
-    np.testing.assert_allclose(model.geom("upper ball 0").rgba[:3], look.LOOSE_BALL, rtol=1e-6)
+    np.testing.assert_allclose(model.geom("lower ball 0").rgba[:3], colours.BALL, rtol=1e-6)
+    np.testing.assert_allclose(model.geom("upper ball 0").rgba[:3], colours.LOOSE_BALL, rtol=1e-6)
 
 
 # ---------------------------------------------------------------- the file
@@ -272,7 +274,7 @@ def test_the_xml_is_one_file_with_the_same_spindle_in_it(spindle, spinning, elem
     data, reference = mujoco.MjData(model), mujoco.MjData(straight)
     mujoco.mj_forward(model, data)
     mujoco.mj_forward(straight, reference)
-    for mesh in (*look.region_meshes(spindle), *look.plate_meshes(spindle), *look.stripe_meshes(spindle)):
+    for mesh in (*solids.region_meshes(spindle), *solids.plate_meshes(spindle), *solids.stripe_meshes(spindle)):
         np.testing.assert_allclose(in_world(model, data, mesh.region), in_world(straight, reference, mesh.region), atol=1e-7)
     np.testing.assert_allclose(data.cam_xmat, reference.cam_xmat, atol=1e-5)
     chain = rotor_base(spindle, spinning)

@@ -14,7 +14,8 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices
-from thermospindle.model.rotor.modes import frf, modes
+from thermospindle.model.rotor.frf import frf
+from thermospindle.model.rotor.modes import modes
 from thermospindle.model.scene.reading import build
 from thermospindle.model.units import RPM
 from thermospindle.sim.hammer.test import impact_tests

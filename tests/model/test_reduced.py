@@ -9,7 +9,8 @@ import pytest
 
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import modes, oscillating, poles, poles_below, vectors_below
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.rotor.poles import oscillating, poles, poles_below, vectors_below
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import HERTZ, RPM

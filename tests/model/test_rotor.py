@@ -19,7 +19,9 @@ from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Element, Matrices, RotorBase, matrices, motion_rows, rotor_base
 from thermospindle.model.rotor.chain import sprung as on_a_spring
 from thermospindle.model.rotor.elements import ELEMENTS
-from thermospindle.model.rotor.modes import frf, group_energy, modes, point_rows, poles
+from thermospindle.model.rotor.frf import frf, point_rows
+from thermospindle.model.rotor.modes import group_energy, modes
+from thermospindle.model.rotor.poles import poles
 from thermospindle.model.scene.reading import build, load
 from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM

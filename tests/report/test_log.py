@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 from tests.test_imports import SIMULATES, loaded_by
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
-from thermospindle.model.rotor.modes import point_rows
+from thermospindle.model.rotor.frf import point_rows
 from thermospindle.model.scene.reading import load
 from thermospindle.report.log import content as log_content
 from thermospindle.report.log import run as log

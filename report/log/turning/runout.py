@@ -15,7 +15,7 @@ import numpy as np
 import rerun as rr
 
 from thermospindle.model.bearing.definitions import Bearing, RollerBearing
-from thermospindle.model.rotor.look import stripe_meshes
+from thermospindle.model.rotor.look.meshes import stripe_meshes
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM, TO_MM, TO_NM
 from thermospindle.report.figures.runout import polar_figure, waterfall_figure

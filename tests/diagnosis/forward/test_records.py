@@ -13,7 +13,7 @@ from thermospindle.diagnosis.forward.response import Response
 from thermospindle.diagnosis.parameters.nuisance import (
     RECORD,
 )
-from thermospindle.model.rotor.modes import poles
+from thermospindle.model.rotor.poles import poles
 
 
 @pytest.mark.parametrize("before", [0.0, 0.004])

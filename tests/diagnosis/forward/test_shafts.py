@@ -17,7 +17,8 @@ from thermospindle.diagnosis.parameters.reference import reference_modes
 from thermospindle.diagnosis.prediction.modes import predict
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.rotor.modes import kinds, oscillating, poles_below, with_mass_between
+from thermospindle.model.rotor.modes import kinds
+from thermospindle.model.rotor.poles import oscillating, poles_below, with_mass_between
 from thermospindle.model.scene.reading import build, load
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.beside import beside

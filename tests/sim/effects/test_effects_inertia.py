@@ -8,7 +8,8 @@ import pytest
 from tests.effect_points import REST, RUNNING, at
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices, motion_rows
-from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.rotor.poles import poles
 from thermospindle.model.sensors import loaded
 from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM

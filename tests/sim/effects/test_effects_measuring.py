@@ -10,7 +10,8 @@ from tests.conftest import ROOT
 from tests.effect_points import RUNNING, at
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.rotor.modes import frf, point_rows, poles
+from thermospindle.model.rotor.frf import frf, point_rows
+from thermospindle.model.rotor.poles import poles
 from thermospindle.model.scene.reading import load
 from thermospindle.report.log.content import bearing_series
 from thermospindle.sim.campaign.beside import measured_at

@@ -10,7 +10,8 @@ from scipy.integrate import quad
 from tests.effect_points import REST, RUNNING, at
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
-from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.rotor.poles import poles
 from thermospindle.model.structure import Body, with_mass
 from thermospindle.sim.effects.roles import in_series
 from thermospindle.sim.effects.structure import shaft_bending, support_anisotropy

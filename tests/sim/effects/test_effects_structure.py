@@ -12,7 +12,8 @@ from thermospindle.model.bearing.row import contact_constants
 from thermospindle.model.machine import Condition
 from thermospindle.model.material import Law
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
-from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.rotor.poles import poles
 from thermospindle.model.scene.reading import load
 from thermospindle.model.structure import Body
 from thermospindle.sim.effects.structure import (

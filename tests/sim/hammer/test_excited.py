@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import ROOT
 from thermospindle.model.machine import Condition
-from thermospindle.model.rotor.modes import frf, point_rows
+from thermospindle.model.rotor.frf import frf, point_rows
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.sim.hammer.excited import most_excited, peaks

@@ -8,7 +8,7 @@ import pytest
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
-from thermospindle.model.rotor.modes import frf, point_rows
+from thermospindle.model.rotor.frf import frf, point_rows
 from thermospindle.sim.hammer.estimate import Windows, estimate
 from thermospindle.sim.hammer.pulse import Hit, draw_hits, force, pulse_duration
 from thermospindle.sim.hammer.test import acquire, estimate_of, impact_tests, sampling, simulate

@@ -1,4 +1,4 @@
-"""What a flexible shaft looks like: a cut-away slice for every node, which moves with it, so that a bending shaft is seen to bend."""
+"""A cut-away slice of a flexible shaft for every node, which moves with it, so that a bending shaft is seen to bend."""
 
 from __future__ import annotations
 
