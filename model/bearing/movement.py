@@ -24,6 +24,7 @@ FARTHEST, REACH = 1e-4, 5e-3  # m, in one of them at first, and at all
 STEEP = 0.5  # of the slope along a step, at most where it ends
 EXACT, ROUNDED = 1e-17, 1e-15  # m, of what is left of a step, and below which a step that does not get shorter is rounding
 LOOSE, PUSHED = 1.0, 1e-9  # N/m, less than which nothing is held by, and N, from which it goes where it is pushed
+BEYOND = 1.6  # of a step to where a force of the power 1.5 begins, more than which ends where it has not begun
 
 
 def moved_rings(spindle: Spindle, rows: Mapping[str, BallRow], centres: Centres) -> dict[str, float]:
@@ -73,7 +74,10 @@ def _stepped(balance: Balance, y: Array, rows: list[BallRow], centres: Centres) 
             return y
         if length**3 <= EXACT * last**2:  # steps that double their digits leave this
             return np.asarray(y + move)
-        share, there = _along(balance, y, move, float(here[0] @ move), rows, centres)
+        if np.abs(here[0]).max() < PUSHED and length > ROUNDED:  # at the end of a play, which steps come near and do not reach
+            share, there = BEYOND, _imbalance(balance, y + BEYOND * move, rows, centres)
+        else:
+            share, there = _along(balance, y, move, float(here[0] @ move), rows, centres)
         y, here, last = y + share * move, there, length if share == 1.0 else 0.0
     raise NoEquilibrium("the bearings find no axial equilibrium")
 

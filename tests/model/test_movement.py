@@ -119,6 +119,16 @@ def test_what_nothing_presses_stays():
     assert Rings(((LOOSE, 1), (mirrored(LOOSE), 1))).stepped() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("pressed", [1e-6, 20e-6])
+def test_what_has_play_hangs_loose(pressed):
+    """One row is pressed, and its play is the other's: it leaves it for good, and no stiffness of a few N/m stays. Of steps that come near its end none reached it."""
+    row = replace(ROW, axial=ROW.axial + pressed)
+    rings = Rings(((row, 1), (replace(mirrored(ROW), axial=-ROW.axial + 100e-6), 1)))
+    moved = rings.stepped()
+    for row, m in zip(rings.rows.values(), moved, strict=True):
+        assert centred_axial(row, m) == (0.0, 0.0)
+
+
 @pytest.mark.parametrize("load", [30.0, -30.0, 1e-3])
 def test_what_hangs_loose_goes_where_it_is_pushed(load):
     """No slope tells how far. Of many carriers such rows were said to be in balance where they hung."""

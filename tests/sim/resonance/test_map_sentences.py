@@ -71,9 +71,9 @@ def test_a_warning_of_every_bearing_is_one(spindle):
     named = replace(spindle, bearings=tuple(replace(spindle.bearings[0], name=name) for name in ("front", "rear", "third")))
     other = replace(spindle.bearings[0], name="large", pitch_diameter=0.036)
     [merged] = of_conditions(named, [Condition(20.0, 400_000 * RPM)])
-    assert "in the front, rear and third bearings; ball" in merged
+    assert "in the front, rear and third bearings; rolling" in merged
     merged, alone = of_conditions(replace(named, bearings=(*named.bearings, other)), [Condition(20.0, 400_000 * RPM)])
-    assert "in the front, rear and third bearings; ball" in merged
+    assert "in the front, rear and third bearings; rolling" in merged
     assert "n dm of 1.44e+07 mm rev/min in the large bearing; rolling bearings end at about 2.5e+06" in alone
 
 
