@@ -20,11 +20,10 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 from thermospindle.sim.campaign.runout_record import WINDOWS, RunoutRecord
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.running.lines import fit
+from thermospindle.sim.running.lines import TOGETHER, fit, groups
 
 MULTIPLE = 4  # of the number of balls and of even ball orders: highest lines looked for
-TOGETHER = 0.5  # bins: lines of a time record nearer than this are one; of a spectrum those that share bins
-REACH = {"none": 1, "hann": 2, "flattop": 4}  # bins on either side that hold a line of a spectrum
+REACH = {"none": 1, "hann": 2, "flattop": 4}  # bins on either side that hold a line of a spectrum: those that share bins are one
 OF_BINS = 0.04  # relative error of an amplitude from bins
 AROUND = 15  # bins on either side from which the floor around a line is estimated
 SLIPS = np.linspace(-0.006, 0.006, 49)  # relative changes of d cos(angle) / D that are tried
@@ -160,13 +159,8 @@ def slipped(kin: Mapping[str, Kinematics], slip: float) -> dict[str, Kinematics]
 
 def _clusters(known: list[Line], near: float) -> list[list[Line]]:
     """Lines in order of frequency, those within `near` (Hz) of the one before together."""
-    found: list[list[Line]] = []
-    for line in sorted(known, key=lambda g: g.frequency):
-        if found and line.frequency - found[-1][-1].frequency <= near:
-            found[-1].append(line)
-        else:
-            found.append([line])
-    return found
+    rising = sorted(known, key=lambda g: g.frequency)
+    return [[rising[i] for i in group] for group in groups([g.frequency for g in rising], near)]
 
 
 def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: float, uncertain: Array) -> Array:

@@ -97,11 +97,11 @@ def distinct(frequency: Array, length: float) -> Array:
     return np.array(kept)
 
 
-def groups(frequency: Array, length: float) -> list[list[int]]:
-    """Indices of rising frequencies (Hz) that a record of `length` (s) cannot separate."""
+def groups(frequency: Sequence[float] | Array, near: float) -> list[list[int]]:
+    """Indices of rising frequencies (Hz), those within `near` (Hz) of the one before together."""
     found: list[list[int]] = []
     for i, f in enumerate(frequency):
-        if found and f - frequency[found[-1][-1]] <= TOGETHER / length:
+        if found and f - frequency[found[-1][-1]] <= near:
             found[-1].append(i)
         else:
             found.append([i])
@@ -151,7 +151,7 @@ def find_lines(
         predicted.T * np.exp(2j * np.pi * _frequencies(known) * middle),
     ]
     found = []
-    for members in groups(candidates, length):
+    for members in groups(candidates, TOGETHER / length):
         ends = candidates[members[0]] - SNAP / length, candidates[members[-1]] + SNAP / length
         near = [i for i, line in enumerate(known) if ends[0] <= line.frequency <= ends[1]]
         for direction in ("radial", "axial"):
