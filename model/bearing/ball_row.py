@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import hypot, sqrt
+from types import MappingProxyType
 
 import numpy as np
 import scipy
@@ -84,6 +85,14 @@ def azimuths(balls: int) -> Array:
 
 
 @dataclass(frozen=True)
+class Rolled:
+    """Where balls with inertia have settled: the speed of their cage (rad/s), and every ball's centre, (r, z) from the inner groove's (m)."""
+
+    cage: float
+    centres: tuple[Vector, ...]
+
+
+@dataclass(frozen=True)
 class RowForce:
     """Answer of a row at one displacement; per-ball arrays have shape (balls,)."""
 
@@ -94,6 +103,7 @@ class RowForce:
     inner_angle: Array  # (balls,) rad
     outer_angle: Array  # (balls,) rad
     deformation: Array  # (balls,) m, both contacts together, negative: play
+    rolled: Rolled | None = None  # of balls with inertia
 
     @property
     def in_contact(self) -> NDArray[np.bool_]:
@@ -126,29 +136,21 @@ def energy(row: BallRow, displacement: Array) -> float:
     return float(0.4 * row.constant * np.sum(np.maximum(stretch, 0.0) ** 2.5))
 
 
-def respond(row: BallRow, displacement: Array | None = None, centre: Vector | None = None) -> RowForce:
+def respond(row: BallRow, displacement: Array | None = None, near: Rolled | None = None) -> RowForce:
     """Force and tangent stiffness at a displacement (5,) of the outer ring relative to the inner; centred rings by default.
 
-    `centre` is where balls with inertia may settle, as far as one knows.
+    `near` is what balls with inertia did at another displacement, from which they are sought.
     """
     u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
     line = centre_line(row, u)
-    local, cage = _with_inertia(row, line, centre) if row.heavy else (_massless(row, line), None)
+    local, cage, rolled = _with_inertia(row, line, near) if row.heavy else (_massless(row, line), None, None)
     force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
     b = kinematics(row)
     flat = b.reshape(-1, 5)
     tangent = flat.T @ (stiffness @ b).reshape(-1, 5)
     if cage is not None:
         tangent += np.outer(cage.force_by_speed.ravel() @ flat, cage.speed_by_line.ravel() @ flat)
-    return RowForce(
-        force.ravel() @ flat,
-        tangent,
-        inner,
-        outer,
-        inner_angle,
-        outer_angle,
-        deformation,
-    )
+    return RowForce(force.ravel() @ flat, tangent, inner, outer, inner_angle, outer_angle, deformation, rolled)
 
 
 def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
@@ -173,19 +175,19 @@ class Cage:
     speed_by_line: Array
 
 
-def _with_inertia(row: BallRow, line: Array, centre: Vector | None) -> tuple[tuple[Array, ...], Cage | None]:
+def _with_inertia(row: BallRow, line: Array, near: Rolled | None) -> tuple[tuple[Array, ...], Cage | None, Rolled]:
     """As `_massless` at the speed of the cage, with the centre of every ball an unknown of its own; and what the cage does as rings move."""
     lines = [(r, z) for r, z in line.tolist()]
-    _, found = at_one_speed(row, lines, centre)
+    speed, found = at_one_speed(row, lines, *(({}, None) if near is None else (dict(zip(lines, near.centres, strict=True)), near.cage)))
     balances, each = zip(*(found[at] for at in lines), strict=True)
     stiffness = {at: np.reshape(b.stiffness(), (2, 2)) for at, (b, _) in found.items()}
     told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
-    values = told[:2].T, np.array([stiffness[at] for at in lines]), *told[2:]
+    values, rolled = (told[:2].T, np.array([stiffness[at] for at in lines]), *told[2:]), Rolled(speed, tuple(b.centre for b in balances))
     if row.inertia is not None and row.inertia.cage is not None:
-        return values, None
+        return values, None, rolled
     by_itself = 1.0 - float(np.mean([d.by_cage for d in each]))
     cage = Cage(np.array([d.force_by_cage for d in each]), np.array([d.by_line for d in each]) / len(each) / by_itself)
-    return values, cage
+    return values, cage, rolled
 
 
 def with_cage_held(row: BallRow) -> BallRow:
@@ -193,7 +195,7 @@ def with_cage_held(row: BallRow) -> BallRow:
     if row.inertia is None or not row.heavy:
         return row
     line = -row.radial, row.axial
-    return replace(row, inertia=replace(row.inertia, cage=at_one_speed(row, [line], None)[0]))
+    return replace(row, inertia=replace(row.inertia, cage=at_one_speed(row, [line])[0]))
 
 
 def by_own_orbits(row: BallRow, displacement: Array | None = None) -> Array:
@@ -201,17 +203,22 @@ def by_own_orbits(row: BallRow, displacement: Array | None = None) -> Array:
     them together (Jones 1960; Harris 1991, ch. 9, have each ball so); its symmetric part. Nothing where balls have no inertia, or a cage whose speed is held."""
     if row.inertia is None or not row.heavy or row.inertia.cage is not None:
         return np.zeros((5, 5))
-    line = centre_line(row, np.zeros(5) if displacement is None else displacement)
-    lines = [(r, z) for r, z in line.tolist()]
+    held = respond(row, displacement, respond(row).rolled)
+    assert held.rolled is not None
+    lines = [(r, z) for r, z in centre_line(row, np.zeros(5) if displacement is None else displacement).tolist()]
     allowed = tolerances(row, max(hypot(r, z) for r, z in lines))
-    alone = {at: np.reshape(settled(row.ball, at, *allowed).stiffness(), (2, 2)) for at in dict.fromkeys(lines)}
+    starts = dict(zip(lines, held.rolled.centres, strict=True))
+    alone = {at: np.reshape(settled(row.ball, at, *allowed, start).stiffness(), (2, 2)) for at, start in starts.items()}
     b = kinematics(row)
-    tangent = b.reshape(-1, 5).T @ (np.array([alone[at] for at in lines]) @ b).reshape(-1, 5) - respond(row, displacement).tangent
+    tangent = b.reshape(-1, 5).T @ (np.array([alone[at] for at in lines]) @ b).reshape(-1, 5) - held.tangent
     return np.asarray((tangent + tangent.T) / 2)
 
 
-def at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -> tuple[float, dict[Vector, tuple[Balance, Driven]]]:
-    """Speed of the cage, and what a ball is at every different one of `lines` (balls, 2) between the groove centres; balls on the same line, as of centred rings, are one."""
+def at_one_speed(
+    row: BallRow, lines: Sequence[Vector], starts: Mapping[Vector, Vector] = MappingProxyType({}), near: float | None = None
+) -> tuple[float, dict[Vector, tuple[Balance, Driven]]]:
+    """Speed of the cage, and what a ball is at every different one of `lines` (balls, 2) between the groove centres; balls on the same line, as of centred rings, are one. Balls are sought from
+    their `starts`, and the speed from one that is `near`, as far as these are known."""
     free, weights = row.ball, Counter(lines)
     allowed = tolerances(row, max(hypot(r, z) for r, z in weights))
 
@@ -224,15 +231,20 @@ def at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -
     def at_speed(ball: HeavyBall, balances: Mapping[Vector, Balance]) -> dict[Vector, tuple[Balance, Driven]]:
         return {at: (here, driven(ball, here, at)) for at, here in balances.items()}
 
-    here = {at: settled(free, at, *allowed, centre) for at in weights}
-    if (cage := free.inertia.cage) is not None:
-        return cage, at_speed(free, here)
-    cage = mean({at: rolling(free.inertia, b.centre, at).speed for at, b in here.items()})
-    ball = held(cage)
-    if len(here) == 1:  # it rolls with them
-        return cage, at_speed(ball, {at: balance(ball, b.centre, at) for at, b in here.items()})
+    if near is None or free.inertia.cage is not None or len(weights) == 1:
+        here = {at: settled(free, at, *allowed, starts.get(at)) for at in weights}
+        if (cage := free.inertia.cage) is not None:
+            return cage, at_speed(free, here)
+        cage = mean({at: rolling(free.inertia, b.centre, at).speed for at, b in here.items()})
+        ball = held(cage)
+        if len(here) == 1:  # it rolls with them
+            return cage, at_speed(ball, {at: balance(ball, b.centre, at) for at, b in here.items()})
+        starts = {at: b.centre for at, b in here.items()}
+    else:
+        cage, ball = near, held(near)
     for _ in range(ROUNDS):
-        here = {at: settled(ball, at, *allowed, b.centre) for at, b in here.items()}
+        here = {at: settled(ball, at, *allowed, starts.get(at)) for at in weights}
+        starts = {at: b.centre for at, b in here.items()}
         found = at_speed(ball, here)
         speed, by_cage = (mean({at: getattr(d, of) for at, (_, d) in found.items()}) for of in ("speed", "by_cage"))
         step = (speed - cage) / (1.0 - by_cage)

@@ -41,7 +41,7 @@ def centred(row: BallRow, centre: Vector | None = None) -> Centred:
         tangent = np.array(spring((-row.radial / length, sine), along, force / length)) @ squares
         return Centred(row.balls * force * sine, tangent.reshape(5, 5), force, force, angle, angle, deformation)
     line = -row.radial, row.axial
-    _, found = at_one_speed(row, [line], centre)
+    _, found = at_one_speed(row, [line], {} if centre is None else {line: centre})
     ball, driven = found[line]
     tangent = (np.array(ball.stiffness()) @ squares).reshape(5, 5)
     if row.inertia is not None and row.inertia.cage is None:  # it turns with what it drives

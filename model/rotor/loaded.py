@@ -84,8 +84,12 @@ def _ball(chain: RotorBase, b: BearingState) -> _Row:
     light = replace(b.row, inertia=None)
 
     def of(row: BallRow) -> Callable[[Array], tuple[Array, Array]]:
+        last: ball_row.Rolled | None = None
+
         def answer(q: Array) -> tuple[Array, Array]:
-            found = ball_row.respond(row, q)
+            nonlocal last
+            found = ball_row.respond(row, q, last)
+            last = found.rolled
             return found.force, found.tangent
 
         return answer
@@ -140,7 +144,7 @@ class _Structure:
 
 def _balanced(s: _Structure, answers: Sequence[Callable[[Array], tuple[Array, Array]]], v: Array) -> Array | None:
     """The balance by Newton's method from v (m,); None where it does not arrive."""
-    at_rest = [answer(np.zeros(5))[0] for answer in answers]
+    at_rest, last = [answer(np.zeros(5))[0] for answer in answers], 0.0
     for _ in range(MOST_STEPS):
         found = [answer(b @ v) for answer, b in zip(answers, s.rows, strict=True)]
         left = s.load - s.stiffness @ v - sum((b.T @ (f - f0) for b, (f, _), f0 in zip(s.rows, found, at_rest, strict=True)), start=np.zeros_like(v))
@@ -149,8 +153,10 @@ def _balanced(s: _Structure, answers: Sequence[Callable[[Array], tuple[Array, Ar
         if step is None or not np.isfinite(step).all():
             return None
         v = v + step
-        if np.abs(s.basis @ step).max() <= SMALL * np.abs(s.basis @ v).max() + ROUNDED:
+        allowed, length = SMALL * np.abs(s.basis @ v).max() + ROUNDED, float(np.abs(s.basis @ step).max())
+        if length <= allowed or length**3 <= allowed * last**2:  # steps that double their digits leave this
             return v
+        last = length
     return None
 
 
@@ -179,7 +185,7 @@ def _even(tangent: Array) -> Array:
 
 
 def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
-    answer = ball_row.respond(b.row, q)
+    answer = ball_row.respond(b.row, q, ball_row.respond(b.row).rolled)
     stiffness = _even(answer.tangent)
     share = answer.ball_force / max(float(answer.ball_force.sum()), 1e-300)
     most = int(np.argmax(answer.ball_force))
