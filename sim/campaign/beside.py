@@ -14,7 +14,7 @@ from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.rotor.poles import Between
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.model.units import MM
+from thermospindle.model.units import MM, RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 from thermospindle.sim.identification.frf import POWER, Frf, out_of, without
 from thermospindle.sim.operating import OperatingPoint, mass_between, operating_point
@@ -106,7 +106,31 @@ def beside(spindle: Spindle, campaign: Campaign, test: Test, condition: Conditio
 
 def doubtful(spindle: Spindle, campaign: Campaign) -> list[str]:
     """What is odd about a campaign before it is compared with a scene, a sentence each; what its FRFs tell beside the scene's own is `likeness`."""
-    return [*of_another(spindle, campaign), *sense.of_conditions(spindle, [condition_of(t) for t in campaign.tests]), *the_same(campaign), *left_out(campaign)]
+    return [*of_another(spindle, campaign), *sense.of_conditions(spindle, [condition_of(t) for t in campaign.tests]), *far_from(spindle, campaign), *the_same(campaign), *left_out(campaign)]
+
+
+FAR_K, FAR_SHARE = 20.0, 1.5
+"""Beyond the temperatures that a scene is for, and times its nominal speed, from which a test was hardly meant for it."""
+
+
+def far_from(spindle: Spindle, campaign: Campaign) -> list[str]:
+    """A sentence for temperatures, and one for speeds, that are far from what the scene is for, with the unit in which they would not be."""
+    low, high = spindle.temperatures
+    told = []
+    outside = [t for t in campaign.tests if not low - FAR_K <= t.temperature <= high + FAR_K]
+    if outside:
+        span = " to ".join(f"{v:.4g}" for v in dict.fromkeys((min(t.temperature for t in outside), max(t.temperature for t in outside))))
+        units = {"Fahrenheit": lambda c: (c - 32) / 1.8, "kelvin": lambda c: c - 273.15}
+        as_told = [name for name, of in units.items() if all(low - FAR_K <= of(t.temperature) <= high + FAR_K for t in outside)]
+        asked = f"; as degrees {as_told[0]} they would be near" if as_told == ["Fahrenheit"] else "; in kelvin they would be near" if as_told else ""
+        which = f"tests {listed([t.id for t in outside])}" if len(outside) < 4 else f"{len(outside)} tests"
+        told.append(f"{which} at {span} C: the scene is for {low:g} to {high:g} C (temperature_range_C){asked}")
+    nominal, fastest = abs(spindle.nominal_speed) / RPM, max((abs(t.speed) for t in campaign.tests), default=0.0) / RPM
+    if nominal and fastest > FAR_SHARE * nominal:
+        told.append(f"tests turn with up to {fastest:.5g} rpm: the scene is for {nominal:g} rpm (nominal_speed_rpm)")
+    elif nominal and 0 < 60 * fastest <= FAR_SHARE * nominal and fastest < nominal / 40:
+        told.append(f"tests turn with {fastest:.5g} rpm at most: the scene is for {nominal:g} rpm (nominal_speed_rpm); as speeds in Hz, {60 * fastest:.5g} rpm, they would be near")
+    return told
 
 
 def of_another(spindle: Spindle, campaign: Campaign) -> list[str]:

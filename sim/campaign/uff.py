@@ -52,8 +52,8 @@ class Kind(NamedTuple):
 _STANDARD_GRAVITY, _POUND_FORCE, _INCH = 9.80665, 4.4482216152605, 0.0254
 FORCE = 13
 KINDS = {
-    8: Kind("displacement", (1, 0, 0), {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "in": _INCH}),
-    11: Kind("velocity", (1, 0, 0), {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "in/s": _INCH}),
+    8: Kind("displacement", (1, 0, 0), {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "in": _INCH, "mil": 1e-3 * _INCH, "mils": 1e-3 * _INCH, "thou": 1e-3 * _INCH}),
+    11: Kind("velocity", (1, 0, 0), {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "in/s": _INCH, "ips": _INCH, "mil/s": 1e-3 * _INCH, "mils/s": 1e-3 * _INCH}),
     12: Kind(
         "acceleration",
         (1, 0, 0),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -38,19 +39,25 @@ def open_ends(told: Sequence[tuple[str, str, End]]) -> list[Question]:
 
 def open_units(curves: list[tuple[str, Curve]], settings: dict[Path, FileForm]) -> list[Question]:
     """What units and quantities leave open, once a file."""
-    open_: dict[tuple[str, str], list[str]] = {}
+    open_: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for name, curve in curves:
         if isinstance(fault := scaled(curve, settings[curve.file]), str):
             key, _, text = fault.partition(": ")
-            open_.setdefault((key, text), []).append(name)
-    return [Question(", ".join(dict.fromkeys(names)), key, text) for (key, text), names in open_.items()]
+            open_.setdefault((key, text), []).append((name, curve.where))
+    every = Counter(name for name, _ in curves)
+    questions = []
+    for (key, text), of in open_.items():
+        whole = all(every[name] == n for name, n in Counter(name for name, _ in of).items())
+        which = "" if whole else f" (that is {listed(dict.fromkeys(where for _, where in of), 3)}; its other FRFs have units that are known)"
+        questions.append(Question(", ".join(dict.fromkeys(name for name, _ in of)), key, text + which))
+    return questions
 
 
 def scaled(curve: Curve, settings: FileForm) -> tuple[str, float] | str:
     """(quantity, factor to SI) of a curve, or the key and the sentence of what is open."""
     told = units.of_frf(curve.unit) if curve.unit else None
     if curve.unit and told is None:
-        return f'unit: a known unit of its FRFs, as in unit = "(m/s^2)/N"; {curve.unit!r} is none'
+        return f'unit: a known unit of its FRFs, as in unit = "(m/s^2)/N"; {curve.unit!r} is none; known are {units.known()}'
     if told is None:
         said = f"; its header says {curve.quantity}" if curve.quantity else ""
         return f'unit: the unit of its FRFs, as in unit = "(m/s^2)/N", "m/N", "g/N", "(mm/s)/N"{said}'

@@ -58,6 +58,12 @@ def of_response(text: str) -> tuple[str, float] | None:
     return None
 
 
+def known() -> str:
+    """What messages say is known of responses, and of forces."""
+    of = [list(dict.fromkeys(tidy(label) for label in KINDS[number].units)) for number in (*OF_TYPE, FORCE)]
+    return f"{', '.join(label for labels in of[:-1] for label in labels)} over {', '.join(of[-1][:-1])} or {of[-1][-1]}"
+
+
 def of_force(text: str) -> float | None:
     return next((factor for label, factor in KINDS[FORCE].units.items() if tidy(text) == label), None)
 

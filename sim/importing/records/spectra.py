@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from thermospindle.model.types import Array
+from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.mapping import RecordForm
@@ -20,6 +20,7 @@ from thermospindle.sim.importing.records.grouped import Records
 from thermospindle.sim.importing.records.hits import TOUCHING, Hit, check_numbers, fault, hits_of, limits_of
 from thermospindle.sim.importing.records.windows import ENDS_AT, contact_time, end_needed, excited, first_heard, shared
 
+FEWEST_HITS, CLIPPED, BESIDE = 3, 0.03, 3.0  # hits of which one can be told from the others; ln of a factor that is worth a note, and beside what the others differ by
 ALIKE = 1.1  # times the shortest hits of a test, up to which others are cut to these
 SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
 
@@ -91,6 +92,11 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     curves = tuple(_curve(files[0][0], m, i, reference, found, form.estimator, first, len(good) > 1) for i, m in enumerate(moving))
     if len(good) == 1:
         notes.append(f"{name}: a single hit: FRFs without coherence and standard errors")
+    notes += [
+        f"{hit.where}: its FRFs are {100 * off:+.0f} % off those of the other {len(good) - 1} hits on all channels at all lines, as those of a force that was clipped are; overload = {{ force = ... }} of the mapping leaves such hits out"
+        for hit, off in zip(good, _otherwise_large(found.per_hit[..., first:]), strict=True)
+        if off
+    ]
     notes.append(
         f"{name}: {len(good)} of {hits} hits, {form.estimator}, {found.h1.frequency[first] if first else band[0]:.4g} to {band[1]:.4g} Hz in steps of {1 / (n * step):.4g} Hz, "
         + ("no exponential window" if end == 1 else f"exponential window down to {end:g}")
@@ -99,6 +105,25 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     pushed = np.where(pulse[0] > TOUCHING * pulse[0].max(axis=-1, keepdims=True), pulse[0], 0.0)
     middle = step * float((pushed @ (np.arange(float(n)) + 0.5) / pushed.sum(axis=-1)).mean())
     return FromRecords(curves, decay, len(good), tuple(notes), (), middle, n * step)
+
+
+def _otherwise_large(per_hit: ComplexArray) -> list[float]:
+    """By what share the FRFs (hits, responses, 1, lines) of every hit are larger than those of the others, where that is the same on all channels at most lines, and more than these differ by; else 0."""
+    size = np.abs(per_hit).reshape(len(per_hit), -1, per_hit.shape[-1])
+    if len(size) < FEWEST_HITS:
+        return [0.0] * len(size)
+    strong = np.median(size, axis=0)
+    heard = strong > np.median(strong, axis=-1, keepdims=True)
+    found = []
+    for k, own in enumerate(size):
+        others = np.delete(size, k, axis=0)
+        log = np.log(np.maximum(own, 1e-300) / np.median(others, axis=0))
+        by_channel = [float(np.median(row[h])) for row, h in zip(log, heard, strict=True)]
+        usual = float(np.median(np.abs(np.log(np.maximum(others, 1e-300) / np.median(others, axis=0)))[:, heard]))
+        off = float(np.median(by_channel))
+        alike = max(abs(one - off) for one in by_channel) < abs(off) / 2
+        found.append(float(np.expm1(off)) if alike and abs(off) > max(CLIPPED, BESIDE * usual) else 0.0)
+    return found
 
 
 def _apart(files: Sequence[tuple[Path, Sequence[Motion]]], names: str) -> Question | None:

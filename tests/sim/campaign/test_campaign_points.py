@@ -46,7 +46,7 @@ def test_a_campaign_of_another_name_without_a_point_of_the_scene_is_said_to_be(s
 def test_temperatures_that_no_spindle_bears_are_said_of_a_campaign(spindle):
     own = written(spindle)
     assert doubtful(spindle, own) == []
-    [said] = doubtful(spindle, replace(own, tests=(replace(own.tests[0], temperature=600.0),)))
+    said, *_ = doubtful(spindle, replace(own, tests=(replace(own.tests[0], temperature=600.0),)))
     assert said.startswith("600 C lies outside -40 to 120 C")
 
 

@@ -11,10 +11,12 @@ import pytest
 from tests.conftest import DATA, SCENE
 from tests.sim.importing.exported import table
 from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
 from thermospindle.report.verbs import workbench as verb
 from thermospindle.report.verbs.compare import compare
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign import likeness
+from thermospindle.sim.campaign.beside import far_from
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign, write_campaign
 from thermospindle.sim.campaign.likeness import likenesses
 from thermospindle.sim.importing.units import of_frf
@@ -60,6 +62,27 @@ def test_a_factor_between_units_is_said_of_what_has_it(factor, spindle, foreign)
         [said] = likenesses(spindle, changed(foreign, change))
         assert said.startswith(f"{who} about {told}")
     assert likenesses(spindle, changed(foreign, lambda v: 3.0 * v)) == []
+
+
+@pytest.mark.parametrize(
+    ("temperature", "speed", "said"),
+    [
+        (lambda c: c, lambda rpm: rpm, []),
+        (lambda c: 1.8 * c + 32, lambda rpm: rpm, ["C: the scene is for 20 to 60 C (temperature_range_C); as degrees Fahrenheit they would be near"]),
+        (lambda c: c + 273.15, lambda rpm: rpm, ["C: the scene is for 20 to 60 C (temperature_range_C); in kelvin they would be near"]),
+        (lambda c: c + 200.0, lambda rpm: rpm, ["C: the scene is for 20 to 60 C (temperature_range_C)"]),
+        (lambda c: c, lambda rpm: rpm / 60, ["tests turn with 120 rpm at most: the scene is for 7200 rpm (nominal_speed_rpm); as speeds in Hz, 7200 rpm, they would be near"]),
+        (lambda c: c, lambda rpm: 2 * rpm, ["tests turn with up to 14400 rpm: the scene is for 7200 rpm (nominal_speed_rpm)"]),
+        (lambda c: c, lambda rpm: 0 * rpm, []),
+    ],
+)
+def test_temperatures_and_speeds_that_the_scene_is_not_for_are_said(spindle, foreign, temperature, speed, said):
+    """In Fahrenheit, or in Hz, they were imported without a word."""
+    assert max(t.speed for t in foreign.tests) == pytest.approx(7200 * RPM)
+    told = far_from(spindle, replace(foreign, tests=tuple(replace(t, temperature=temperature(max(t.temperature, 40.0)), speed=speed(t.speed)) for t in foreign.tests)))
+    assert len(told) == len(said)
+    for sentence, end in zip(told, said, strict=True):
+        assert sentence.endswith(end)
 
 
 def of_one(campaign: Campaign, test: int, change: Callable[[np.ndarray], np.ndarray]) -> Campaign:

@@ -68,6 +68,25 @@ def test_a_hit_a_row_and_no_hit(tmp_path):
     assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
 
 
+@pytest.mark.parametrize("clipped", [1.0, 0.85])
+def test_a_hit_whose_force_was_clipped_is_told_by_the_others(tmp_path, clipped):
+    """A pulse of a few samples stands at its limit once or twice, which no extreme tells: one hit of five was, and all FRFs were 4 % too large without a word."""
+    random = np.random.default_rng(7)
+    force, answer = zip(*(hit(random) for _ in range(5)), strict=True)
+    force = np.array(force)
+    force[1] = np.minimum(force[1], clipped * force[1].max())
+    force += 0.02 * random.standard_normal(force.shape)
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=force, velocity1=np.array(answer)[:, 0, 0], velocity2=np.array(answer)[:, 1, 0])
+    told = MAPPING.replace('test = "T20"', 'test = "T20"\nreference = 1\ncolumns = { force = "force [N]", velocity1 = "velocity 1 [m/s]", velocity2 = "velocity 2 [m/s]" }', 1)
+    (tmp_path / "m.toml").write_text(told + "[records]\nband_Hz = [50.0, 1000.0]\n")
+    notes = [n for n in bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"] if "off those of the other" in n]
+    if clipped == 1.0:
+        assert not notes
+    else:
+        (note,) = notes
+        assert re.match(r"hammer1.npz: hit 2: its FRFs are \+\d+ % off those of the other 4 hits on all channels at all lines, as those of a force that was clipped are", note)
+
+
 def recorded(sizes, limit=np.inf, quantum=0.0):
     """Hits of one record whose response rings from these sizes on, cut off at the limit of its channel and in steps of `quantum`."""
     random, t = np.random.default_rng(8), np.arange(4000) / RATE

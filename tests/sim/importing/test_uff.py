@@ -75,6 +75,18 @@ def test_each_side_of_an_frf_has_the_unit_of_its_label_or_of_set_164(tmp_path, a
     np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8)
 
 
+def test_a_unit_that_one_frf_has_and_nobody_knows_is_told_with_its_set_and_with_those_that_are_known(tmp_path):
+    """It was told of the file, whose other FRFs have others, and none that is known was named."""
+    rows = list(zip(PAIRS, FRF.value.reshape(len(PAIRS), -1), strict=True))
+    sets = [set_58(FREQUENCY, h, (r, DIRECTIONS[r]), (q, DIRECTIONS[q]), labels=("Hz", "m/s" if k else "furlong", "N")) for k, ((r, q), h) in enumerate(rows)]
+    (tmp_path / "m.toml").write_text(SPINDLE + HEAD)
+    with pytest.raises(Unanswered) as asked:
+        bring([written(tmp_path, "".join(sets))], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    told = str(asked.value)
+    assert "'(furlong)/N' is none; known are m, mm, um, nm, in, mil, mils, thou, m/s," in told
+    assert "over N, mN, kN or lbf (that is set 1; its other FRFs have units that are known)" in told
+
+
 @pytest.mark.parametrize("factors", [(0.0, 0.0), (1e3, 0.0), (0.0, 1.0)])
 def test_factors_of_nothing_are_refused_with_geometry_and_without(tmp_path, factors):
     geometry = f"    -1\n    15\n{1:10d}{0:10d}{0:10d}{0:10d}{12.0:13.5E}{0.0:13.5E}{20.0:13.5E}\n    -1\n" if factors[0] == 0 else ""
@@ -167,9 +179,11 @@ def test_coherence_that_may_be_of_two_frfs_or_of_none_is_left_out_by_name(tmp_pa
 @pytest.mark.parametrize(
     ("text", "quantity", "factor"),
     [("in/s^2/lbf", "accelerance", 0.0254 / 4.4482216152605), ("(in/s2)/N", "accelerance", 0.0254), ("m/s/s/N", "accelerance", 1.0), ("(m/s/s)/N", "accelerance", 1.0)]
-    + [(f"{g}/N", "accelerance", 9.80665) for g in ("g", "G", "gn")],
+    + [(f"{g}/N", "accelerance", 9.80665) for g in ("g", "G", "gn")]
+    + [(f"{mil}/lbf", "receptance", 25.4e-6 / 4.4482216152605) for mil in ("mil", "(mils)", "thou")]
+    + [("ips/lbf", "mobility", 0.0254 / 4.4482216152605), ("(mil/s)/N", "mobility", 25.4e-6)],
 )
-def test_ways_of_writing_an_acceleration(text, quantity, factor):
+def test_ways_of_writing_a_unit(text, quantity, factor):
     assert units.of_frf(text) == (quantity, pytest.approx(factor))
     assert (units.length_factor(text) is None) == ("g" in text.lower())
 
