@@ -142,13 +142,15 @@ def warm_up(
     except heat.NotSettled as error:
         raise heat.NotSettled(f"{where} the bearings run away: {error}; {_remedy(spindle)}") from None
     except OutsideRange as error:
-        if speed and not isinstance(error, heat.RanAway):  # too hot under the loads of the start, which says nothing of what becomes of them
+        if speed:  # too hot on the way to the steady state, which says nothing of when that is
             try:
                 constant = heat.slowest(model, model.field(model.nodal(start)), drive(0.0, model.nodal(start)))
             except OutsideRange:
                 pass  # it is the start itself
             else:
-                marched(TIME_CONSTANTS * constant)
+                history = marched(TIME_CONSTANTS * constant)
+                after = machine.read.region_means(history.nodal[-1])
+                error = type(error)(f"{error}; after {history.times[-1] / MINUTE:.3g} min nothing has left a law yet, and the warmest, {max(after, key=after.__getitem__)}, is at {max(after.values()):.0f} C, but without a steady state no answer is given")
         raise type(error)(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; {_remedy(spindle)}") from None
     final = model.nodal(field)
     constant = heat.slowest(model, field, drive(0.0, final))
@@ -188,10 +190,14 @@ def _ran_away(machine: _Machine, reached: Sequence[Reached], error: str) -> str:
         return f"the bearings leave the range of a law {after}, {hottest} at {temperatures.max():.0f} C: {error}; {_remedy(machine.spindle, hottest)}"
     inner, outer = regions[most.inner_ring], regions[most.outer_ring]
     return (
-        f"the bearings run away {after}: {most.name} has Palmgren's load of friction P1 = {last.loads[most.name]:.0f} N, {grown[most.name]:.2g} times its {begin.loads[most.name]:.0f} N at the start"
+        f"the bearings run away {after}: {most.name} has Palmgren's load of friction P1 = {last.loads[most.name]:.0f} N, {_times(grown[most.name], begin.loads[most.name])} at the start"
         f"{_axially(begin.state, last.state, most.name)}, with its inner ring at {inner:.0f} C and its outer one at {outer:.0f} C{_taken_up(last.state, most.name) if inner > outer else ''}; "
         f"the load heats it further ({error}); {_remedy(machine.spindle, most.name)}"
     )
+
+
+def _times(grown: float, load: float) -> str:
+    return f"{grown:.2g} times its {load:.0f} N" if abs(load) >= 0.5 else "which was none"
 
 
 def _axially(begin: PairState, last: PairState, name: str) -> str:

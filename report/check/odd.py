@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.model.carrier import UNBALANCE, load_carrier, turning_parts, unbalanced
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import PARTS, Point, Spindle
-from thermospindle.model.rotor.poles import lost_to_rounding, poles_below
+from thermospindle.model.rotor.poles import LARGE, lost_to_rounding, poles_below
 from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
@@ -241,7 +241,10 @@ def _hammer(found: Looked) -> Iterator[str]:
     if decay * test.record_length < 3 and test.exponential_end == 1.0:
         yield f"the slowest mode has not died out when the record of {test.record_length:g} s ends; a longer one, or an exponential window, is needed"
     steps = test.hits * len(test.hammer_nodes) * test.record_length / test.step
-    if steps > MANY_STEPS and found.spindle.structure.shafts:
+    freedom, lossy = len(found.reference.chain.dofs), any(e.loss_factor for e in found.reference.chain.elements)
+    if lossy and freedom > LARGE:
+        yield f"virtual hammer tests are by --element reduced alone: loss_factor makes dampers between all {freedom} degrees of freedom, which MuJoCo steps for {LARGE} or fewer"
+    elif steps > MANY_STEPS and found.spindle.structure.shafts:
         yield f"a virtual hammer test takes {steps / 1e6:.1f} million steps of {1e6 * test.step:.2g} us, for the shortest elements of the shaft: places closer together than longest_element_mm make them, or that itself"
 
 

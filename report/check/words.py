@@ -88,7 +88,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
         for name, s in values["shafts"].items()
     ]  # fmt: skip
     bodies = [
-        [name, f"{b['z_mm']:.4g}", f"{b['mass_kg']:.4g}", f"{b['inertia_kg_m2'][0]:.3g}", f"{b['inertia_kg_m2'][2]:.3g}", "yes" if b["turns"] else "no", " ".join(b["moves"])]
+        [name, f"{b['z_mm']:.4g}", f"{b['mass_kg']:.4g}", _by_way(b['inertia_kg_m2'][:2]), f"{b['inertia_kg_m2'][2]:.3g}", "yes" if b["turns"] else "no", " ".join(b["moves"])]
         for name, b in values["bodies"].items()
     ]
     joints = [

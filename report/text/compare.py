@@ -108,6 +108,9 @@ def verdict(c: Comparison) -> str:
     if c.rms_residual < AGREES:
         turned = [f"{m.measured:.0f} Hz of {t.test.id}" for t, m in every if unlike(m)]
         return f"{sentence}; but the shape measured at {_first(turned)} has nothing of the computed one (MAC below {UNLIKE:g})." if turned else f"{sentence}{_alone(c)}."
+    if every:
+        share = float(np.sqrt(np.mean([(m.error / m.measured) ** 2 for _, m in every])))
+        sentence += f" ({100 * share:.2g} % of the frequencies)"
     alone = max((abs(m.residual) for _, m in every), default=0.0)
     if alone < c.rms_residual and not any(t.missing for t in c.tests):
         t, m, off = max(((t, m, abs(m.damping_residual or 0.0)) for t, m in every), key=lambda row: row[2])

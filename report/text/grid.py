@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-OF_LINES = "fi, fo: turning frequencies of the inner and the outer ring; fc: of the cage; fb: of a ball about its own axis, seen from the cage"
+OF_LINES = "fi, fo: turning frequencies of the inner and the outer ring; fc: of the cage; fb: of a ball or roller about its own axis, seen from the cage"
 """Key of the names of lines."""
 APART = 2  # columns of the terminal between two columns of a table
 WORDS = 24  # columns of the terminal left to words before they wrap

@@ -114,7 +114,8 @@ def takes_long(spindle: Spindle, element: str | None, temperatures: int) -> str:
     test = spindle.hammer
     _, steps = sampling(test)
     dofs, hits = sum(len(b.moves) for b in spindle.structure.bodies), test.hits * len(test.hammer_nodes) * temperatures
-    if (element or usual(test)) != LINEAR or steps * dofs * hits < LONG:
+    refused = dofs > LARGE and any(j.loss_factor for j in spindle.structure.joints)  # `check_step` says why
+    if (element or usual(test)) != LINEAR or refused or steps * dofs * hits < LONG:
         return ""
     return f"MuJoCo takes {steps} steps of {dofs} degrees of freedom for each of {hits} hits, which is minutes of work; --element {REDUCED} computes records of the same linear model without it, in seconds"
 

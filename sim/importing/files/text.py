@@ -138,7 +138,7 @@ def _manner(file: Path, lines: list[str]) -> tuple[str | None, bool]:
             for cells in (_cells(line, separator) for separator in ("\t", ";", None)):
                 if len(cells) > 1 and all(NUMBER_LIKE.fullmatch(c) for c in cells) and (grouped := [c for c in cells if THOUSANDS.fullmatch(c)]):
                     raise BadInput(f"{file}: {grouped[0]!r}: thousands are written without a separator")
-        raise BadInput(f"{file}: holds no table of numbers; columns separated by tabs, semicolons, commas or spaces are read")
+        raise BadInput(f"{file}: holds no table of numbers; columns separated by tabs, semicolons, commas or spaces are read. A log of the tests is none: leave it out of the files; what it tells stands in the mapping, at [[tests]]")
     return found
 
 

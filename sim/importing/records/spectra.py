@@ -110,19 +110,19 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
 def _otherwise_large(per_hit: ComplexArray) -> list[float]:
     """By what share the FRFs (hits, responses, 1, lines) of every hit are larger than those of the others, where that is the same on all channels at most lines, and more than these differ by; else 0."""
     size = np.abs(per_hit).reshape(len(per_hit), -1, per_hit.shape[-1])
-    if len(size) < FEWEST_HITS:
+    size = size[:, np.all(size > 0, axis=(0, 2))]  # NaN of a dead force, 0 of a dead response
+    if len(size) < FEWEST_HITS or not size.size:
         return [0.0] * len(size)
     strong = np.median(size, axis=0)
-    heard = strong > np.median(strong, axis=-1, keepdims=True)
+    heard = strong >= np.median(strong, axis=-1, keepdims=True)
     found = []
     for k, own in enumerate(size):
         others = np.delete(size, k, axis=0)
-        log = np.log(np.maximum(own, 1e-300) / np.median(others, axis=0))
-        by_channel = [float(np.median(row[h])) for row, h in zip(log, heard, strict=True)]
-        usual = float(np.median(np.abs(np.log(np.maximum(others, 1e-300) / np.median(others, axis=0)))[:, heard]))
-        off = float(np.median(by_channel))
+        usual = np.median(others, axis=0)
+        by_channel = [float(np.median(row[h])) for row, h in zip(np.log(own / usual), heard, strict=True)]
+        scatter, off = float(np.median(np.abs(np.log(others / usual))[:, heard])), float(np.median(by_channel))
         alike = max(abs(one - off) for one in by_channel) < abs(off) / 2
-        found.append(float(np.expm1(off)) if alike and abs(off) > max(CLIPPED, BESIDE * usual) else 0.0)
+        found.append(float(np.expm1(off)) if alike and abs(off) > max(CLIPPED, BESIDE * scatter) else 0.0)
     return found
 
 
