@@ -24,7 +24,11 @@ from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import beside, check_points, measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.effects import of_scene
+from thermospindle.sim.hammer.excited import unseen
+from thermospindle.sim.operating import OperatingPoint
 
+SAME = 1e-3
+"""Relative, within which a frequency with the mass of shafts where it is, and one with masses at nodes, are one mode's."""
 GONE = 5.0
 """Standard errors that a missing mode counts as at least: whether it is there at all does not hang on how sure its frequency is."""
 
@@ -83,7 +87,7 @@ class PairedShape:
 
 @dataclass(frozen=True)
 class TestComparison:
-    """One test; `missing` measured and `extra` computed frequencies (Hz), `correlation` of its FRFs if it has any, `shapes` that its table tells of paired modes."""
+    """One test; `missing` measured and `extra` computed frequencies (Hz), of which those `hidden` no FRF of the test's points shows, `correlation` of its FRFs if it has any, `shapes` that its table tells of paired modes."""
 
     __test__ = False  # not one of pytest's
 
@@ -97,6 +101,14 @@ class TestComparison:
     offsets: Mapping[tuple[int, int], Array]  # by mode number and 0 for its frequency, 1 for its damping: what a relative error of one does to the residuals (2m,)
     beyond: str = ""  # the state of the bearings, where the model gives no FRFs of it
     shapes: tuple[PairedShape, ...] = ()
+    hidden: tuple[float, ...] = ()
+
+    @property
+    def unpaired(self) -> tuple[tuple[str, tuple[float, ...]], ...]:
+        """The frequencies (Hz) without a partner, by what is to be said of them."""
+        seen = tuple(f for f in self.extra if f not in self.hidden)
+        every = ("measured, not computed", self.missing), ("computed, not measured", seen), ("computed, and not to be seen from these points", self.hidden)
+        return tuple((what, values) for what, values in every if values)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.test.id}: {len(self.modes)} modes paired, {len(self.missing)} missing, {len(self.extra)} more computed>"
@@ -278,18 +290,28 @@ def _test(
     found = set(partner.tolist())
     own = beside(spindle, campaign, o.test, o.condition) if frfs else None
     correlation = None if own is None else correlate(own)
+    more = tuple(float(f) for j, f in enumerate(p.frequency) if low <= f <= high and j not in found)
     return TestComparison(
         o.test,
         tuple(modes),
         tuple(o.frequency[lost].tolist()),
-        tuple(float(f) for j, f in enumerate(p.frequency) if low <= f <= high and j not in found),
+        more,
         correlation,
         residuals,
         len(rows) + len(lost),
         offsets,
         own.point.state.status if own is not None and correlation is None else "",
         _told(campaign, o, shown, {i: number[int(partner[i])] for i in shown}),
+        () if own is None else _hidden(own.point, more),
     )
+
+
+def _hidden(point: OperatingPoint, extra: tuple[float, ...]) -> tuple[float, ...]:
+    """Those of some computed frequencies (Hz) that no FRF of the operating point's points and hammers shows."""
+    if not extra:
+        return ()
+    out_of_sight = [m.frequency for m in unseen(point, (min(extra) * (1 - SAME), max(extra) * (1 + SAME)), 0.0)]
+    return tuple(f for f in extra if any(abs(f / other - 1) < SAME for other in out_of_sight))
 
 
 def _told(campaign: Campaign, o: Observation, shown: Mapping[int, tuple[ComplexArray, ComplexArray]], number: Mapping[int, int]) -> tuple[PairedShape, ...]:

@@ -12,21 +12,15 @@ from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.bearing.roller import RollerState, cage_spread
 from thermospindle.model.carrier import load_carrier, unbalance_carrier
 from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
-from thermospindle.model.rotor.frf import frf
-from thermospindle.model.rotor.modes import Mode
-from thermospindle.model.rotor.poles import poles
 from thermospindle.model.shaft import THEORIES, Shaft
 from thermospindle.model.structure import Body
-from thermospindle.model.units import HERTZ, in_rpm
+from thermospindle.model.units import in_rpm
 from thermospindle.sim.effects.effect import Effect, refusal
+from thermospindle.sim.hammer.excited import unseen
 from thermospindle.sim.hammer.pulse import pulse_duration
 from thermospindle.sim.operating import OperatingPoint
 
 ASSUMED = "assumed default: "
-SEEN = 0.05
-"""Of an FRF at its frequency, by which a mode changes it at least where one sees it: half a decibel."""
-ONE = 1e-6
-"""Of a pole, within which two are taken together: their vectors are any combination."""
 NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 
 
@@ -102,7 +96,7 @@ def understood(drawn: Spindle, point: OperatingPoint, catalogue: Sequence[Effect
             "step_us": 1e6 * spindle.hammer.step,
         },
         "modes_Hz": [m.frequency for m in point.modes if m.frequency <= spindle.hammer.band[1]],
-        "modes_unseen": [{"frequency_Hz": m.frequency, "kind": m.kind} for m in unseen(point)],
+        "modes_unseen": [{"frequency_Hz": m.frequency, "kind": m.kind} for m in unseen(point, spindle.hammer.band)],
         "section": {"regions": len(spindle.regions), "materials": sorted({g.material for g in spindle.regions})},
         "effects": {
             "of_the_scene": [a.effect for a in spindle.effects],
@@ -111,26 +105,6 @@ def understood(drawn: Spindle, point: OperatingPoint, catalogue: Sequence[Effect
         },
         "assumed": [{"key": key, "what": p.source.removeprefix(ASSUMED)} for key, p in spindle.provenance.items() if p.source.startswith(ASSUMED)],
     }
-
-
-def unseen(point: OperatingPoint) -> list[Mode]:
-    """Modes within the hammer's band that no FRF of the scene's points and hammers shows.
-
-    At a mode's frequency its own term of an FRF, with those of modes less than two half-widths away, is below `SEEN` of the whole FRF there: its
-    peak is a change of the curve by no more than that.
-    """
-    (low, high), found, m = point.spindle.hammer.band, poles(point.linear), point.measurement
-    residues = np.einsum("rk,kh->rhk", m.response_rows @ found.right, found.left @ m.reference_rows.T)
-    hidden = []
-    for mode in point.modes:
-        if low <= mode.frequency <= high:
-            at = mode.damped_frequency()
-            near = np.abs(found.value - mode.pole) <= max(2 * abs(mode.pole.real), ONE * abs(mode.pole))
-            own = np.abs((residues[:, :, near] / (1j * HERTZ * at - found.value[near])).sum(-1))
-            whole = np.abs(frf(point.linear, m.response_rows, m.reference_rows, np.array([at]))[:, :, 0])
-            if not np.any(own > SEEN * whole):
-                hidden.append(mode)
-    return hidden
 
 
 def arrangement(rows: Sequence[Bearing]) -> str:

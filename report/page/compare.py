@@ -108,9 +108,7 @@ def _summary(c: Comparison) -> str:
         words.append(f", the largest in standard errors that of mode {worst.number} ({worst.kind}), {signed(residual, 1)} standard errors or {error}")
     words.append(".</p>")
     words.append(f"<p>{prose(constant)}</p>" if (constant := constant_words(c)) else "")
-    remarks = [f"{label(t.test, ', ')}: {what} {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests
-            for what, values in (("measured, not computed (a mode the model lacks, or a false pole):", t.missing), ("computed, not measured:", t.extra))
-            if values]  # fmt: skip
+    remarks = [f"{label(t.test, ', ')}: {what}: {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests for what, values in t.unpaired]
     remarks += list(c.crossings)
     return "".join(words) + ("<ul>" + "".join(f"<li>{minus(str(Markup.escape(x)))}</li>" for x in remarks) + "</ul>" if remarks else "")
 

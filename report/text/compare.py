@@ -50,6 +50,7 @@ def _test_json(t: TestComparison) -> dict[str, Any]:
         "modes": [_mode_json(m) for m in t.modes],
         "missing_Hz": list(t.missing),
         "extra_Hz": list(t.extra),
+        "hidden_Hz": list(t.hidden),
         "frac": {f"{response},{reference}": value for (response, reference), value in t.frac.items()},
         "correlation": None if t.correlation is None else _band_json(t.correlation.whole),
         "bands": [] if t.correlation is None else [_band_json(b) for b in t.correlation.bands],
@@ -213,9 +214,8 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
     else:
         _show_by_mode(console, c)
     for t in c.tests:
-        for what, values in (("measured, not computed", t.missing), ("computed, not measured", t.extra)):
-            if values:
-                console.print(f"{t.test.id}: {what}: {', '.join(f'{f:.1f}' for f in values)} Hz", highlight=False)
+        for what, values in t.unpaired:
+            console.print(f"{t.test.id}: {what}: {', '.join(f'{f:.1f}' for f in values)} Hz", highlight=False)
     if not verbose:
         console.print("--verbose shows every mode of every test, the likeness of FRFs, COMAC and crossings of modes.", style="dim", highlight=False)
         return

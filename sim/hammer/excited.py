@@ -1,4 +1,4 @@
-"""Which modes a hammer test shows: how high each one's peak is where the hammers strike, and which are the same shape in two planes.
+"""Which modes a hammer test shows: how high each one's peak is where the hammers strike, which no FRF shows, and which are the same shape in two planes.
 
 Ewins, *Modal Testing* (2000), 2.5-2.7: a mode's term in the mobility is residue / (i omega - pole), at its resonance |residue| / (damping ratio x omega).
 """
@@ -9,17 +9,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thermospindle.model.rotor.frf import point_rows
+from thermospindle.model.rotor.frf import frf, point_rows
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.rotor.poles import poles
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.units import HERTZ
 from thermospindle.sim.operating import OperatingPoint
 
 TWIN = 0.8
 """MAC of two shapes, planes left aside, from which they are one shape in two planes."""
 SILENT = 1e-5
 """Of the highest peak; what is lower no hammer excites."""
+SEEN = 0.05
+"""Of an FRF at its frequency, by which a mode changes it at least where one sees it: half a decibel."""
+ONE = 1e-6
+"""Of a pole, within which two are taken together: their vectors are any combination."""
 
 
 def peaks(point: OperatingPoint, modes: Sequence[Mode]) -> Array:
@@ -28,6 +33,26 @@ def peaks(point: OperatingPoint, modes: Sequence[Mode]) -> Array:
     found = poles(point.linear)
     residue = np.abs((struck @ found.right) * (found.left @ struck.T).T * found.value).max(axis=0) / np.abs(found.value.real)
     return np.array([residue[np.argmin(np.abs(found.value - m.pole))] for m in modes])
+
+
+def unseen(point: OperatingPoint, band: tuple[float, float], widths: float = 2.0) -> list[Mode]:
+    """Modes within a band (Hz) that no FRF of the points and hammers shows.
+
+    At a mode's frequency its own term of an FRF, with those of modes less than so many half-widths away, is below `SEEN` of the whole FRF there: its
+    peak is a change of the curve by no more than that.
+    """
+    found, m = poles(point.linear), point.measurement
+    residues = np.einsum("rk,kh->rhk", m.response_rows @ found.right, found.left @ m.reference_rows.T)
+    hidden = []
+    for mode in point.modes:
+        if band[0] <= mode.frequency <= band[1]:
+            at = mode.damped_frequency()
+            near = np.abs(found.value - mode.pole) <= max(widths * abs(mode.pole.real), ONE * abs(mode.pole))
+            own = np.abs((residues[:, :, near] / (1j * HERTZ * at - found.value[near])).sum(-1))
+            whole = np.abs(frf(point.linear, m.response_rows, m.reference_rows, np.array([at]))[:, :, 0])
+            if not np.any(own > SEEN * whole):
+                hidden.append(mode)
+    return hidden
 
 
 def most_excited(point: OperatingPoint, modes: Sequence[Mode], count: int) -> list[int]:

@@ -196,10 +196,24 @@ def test_a_build_without_effects_is_within_tolerances(spindle):
         "modes",
         "missing_Hz",
         "extra_Hz",
+        "hidden_Hz",
         "frac",
         "correlation",
         "bands",
     }
+
+
+def test_modes_that_no_point_shows_are_not_missed(spindle):
+    """The driving point of one plane shows no mode of the other: those were told as "computed, not measured", among which what is really missed is lost."""
+    campaign = read_campaign(DATA / "foreign_bond")
+    test = next(t for t in campaign.tests if t.id == "T20_n0")
+    one = replace(test.frf, value=test.frf.value[:1, :1], coherence=None, sd=None, response_nodes=(1,), reference_nodes=(1,))
+    whole, of_one = (compare(spindle, replace(campaign, tests=(t,))).tests[0] for t in (test, replace(test, frf=one)))
+    assert whole.hidden == ()
+    assert of_one.hidden == of_one.extra
+    assert len(of_one.hidden) == 3
+    assert [what for what, _ in of_one.unpaired] == ["computed, and not to be seen from these points"]
+    assert comparison_json(replace(compare(spindle, replace(campaign, tests=(test,))), tests=(of_one,)))["tests"][0]["hidden_Hz"] == list(of_one.hidden)
 
 
 def test_a_soft_bond_pulls_most_at_the_transition(spindle):
