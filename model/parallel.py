@@ -76,7 +76,7 @@ def in_parallel(
     def finished(result: Result) -> None:
         results.append(result)
         done(result)
-        _tell(len(results), count)
+        tell(len(results), count)
 
     for result in known:
         finished(result)
@@ -118,7 +118,8 @@ def watched(told: Callable[[int, int], object]) -> Iterator[None]:
         _watcher = before
 
 
-def _tell(done: int, of: int) -> None:
+def tell(done: int, of: int) -> None:
+    """Whoever watches how many parts of a long step are done, and of how many."""
     if _watcher is not None:
         _watcher(done, of)
 

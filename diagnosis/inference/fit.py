@@ -8,7 +8,7 @@ it is judged. A step to where no spindle can be built is taken shorter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -86,10 +86,11 @@ def rated(model: CampaignModel, fit: Fit) -> Fit:
 def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | Sequence[Array] | None = None, rates: Rates | None = None,
     tempers: Sequence[float] = TEMPERS, learned: Learned | None = None, moved: Array = UNMOVED, beaten: float = np.inf,
+    done: Callable[[int, int], object] = lambda count, of: None,
 ) -> Fit:
     """The fit with the reference widths of all priors, or those `learned`, with what may be misjudged of conditions and mechanisms that `moved` the modes; of several
     starts from the one of least cost, and from there with errors as much larger at first as it is `AFAR`. While they are taken too large, the thinned model serves.
-    What ends above the cost `beaten` need not end exactly.
+    What ends above the cost `beaten` need not end exactly. `done` is told how many of the steps in temper are, and of how many.
 
     Raises what the model raises where even the start cannot be built.
     """
@@ -106,11 +107,13 @@ def fit(
     p = problem.within_limits(p)
     if rates is None:
         rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p))
-    for temper in (*_from_afar(problem, p, tempers[0]), *tempers):
+    every = (*_from_afar(problem, p, tempers[0]), *tempers)
+    for count, temper in enumerate(every, 1):
         problem = at(temper)
         p, lines, residuals, rates = _settled(problem, p, rates, temper, beaten)
-        done = problem, p, rates, temper, lines, residuals
-    return _finished(*done)
+        found = problem, p, rates, temper, lines, residuals
+        done(count, len(every))
+    return _finished(*found)
 
 
 def _from_afar(problem: Problem, p: Array, first: float) -> Sequence[float]:

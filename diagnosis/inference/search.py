@@ -32,7 +32,7 @@ from thermospindle.diagnosis.inference.singles import (
     of_each_name,
 )
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, with_own_laws
-from thermospindle.model.parallel import in_parallel, meanwhile
+from thermospindle.model.parallel import in_parallel, meanwhile, tell
 from thermospindle.model.types import Array
 
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
@@ -111,7 +111,7 @@ def search(
 
 
 def _without_effects(model: CampaignModel) -> Hypothesis:
-    first = fit(model)
+    first = fit(model, done=tell)
     return settled(model, Hypothesis(first, evidence(model, first)))
 
 
