@@ -61,7 +61,8 @@ class Warmup:
     `moments` stand at `history.times` (s); `frequencies` (times, modes) in Hz follow the modes of the first moment by their shape, NaN
     where one has been lost; `steady` is the end of all times, `steady_frequencies` (modes,) its modes; `time_constant` (s) of the
     slowest decay about it. `left_out` names effects whose region temperatures are computed here instead. `feedback` is what comes back
-    in the steady state of bearing loads that are added, through the heat that they make: at 1 it would run away.
+    in the steady state of bearing loads that are added, through the heat that they make: at 1 it would run away. Where there is no steady state, and a time was told, `unsteady` says why,
+    and the time constant is that of the loads at the start.
     """
 
     spindle: Spindle
@@ -72,15 +73,26 @@ class Warmup:
     moments: tuple[Moment, ...]
     modes: tuple[Mode, ...]
     frequencies: Array
-    steady: Moment
+    steady: Moment | None
     steady_frequencies: Array
     time_constant: float
     left_out: tuple[str, ...]
     feedback: float = 0.0
+    unsteady: str = ""
 
     @property
     def times(self) -> Array:
         return self.history.times
+
+    @property
+    def every(self) -> tuple[Moment, ...]:
+        """All moments, and the steady state after them where there is one."""
+        return self.moments if self.steady is None else (*self.moments, self.steady)
+
+    @property
+    def every_frequency(self) -> Array:
+        """Frequencies (moments and the steady state, modes)."""
+        return self.frequencies if self.steady is None else np.vstack([self.frequencies, self.steady_frequencies])
 
 
 def warm_up(
@@ -95,7 +107,7 @@ def warm_up(
     """From a uniform temperature `start` (C) at `speed` (rad/s) in `air` (C, as the start by default) for `duration` (s).
 
     `duration` is `TIME_CONSTANTS` slowest decays by default; modes in the hammer's band are followed.
-    BadInput for a spindle without convection or a duration that is not positive; OutsideRange where a law does not reach; NoEquilibrium
+    BadInput for a spindle without convection or a duration that is not positive; OutsideRange where a law does not reach within it; NotSettled
     where preload and friction drive each other up without end.
     """
     if duration is not None and not duration >= SHORTEST:
@@ -137,34 +149,37 @@ def warm_up(
             raise type(error)(f"{where} {_ran_away(machine, reached, str(error))}") from None
 
     where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
+
+    def answered(history: heat.History, final: Array | None, constant: float, back: float = np.nan, unsteady: str = "") -> Warmup:
+        progress(f"temperatures in {len(history.times) - 1} steps")
+        moments = tuple(machine.moment(nodal) for nodal in history.nodal)
+        steady = () if final is None else (machine.moment(final),)
+        first = tuple(modes(moments[0].point.chain, highest=spindle.hammer.band[1]))
+        followed = _followed(first, [*moments, *steady])
+        progress("natural frequencies")
+        end, lost = (steady[0], followed[-1]) if steady else (None, np.full(len(first), np.nan))
+        return Warmup(spindle, start, air, speed, history, moments, first, followed[: len(moments)], end, lost, constant, left_out, back, unsteady)
+
     try:
         field = heat.settled(model, lambda nodal: drive(0.0, nodal), start)
-    except heat.NotSettled as error:
-        raise heat.NotSettled(f"{where} the bearings run away: {error}; {_remedy(spindle)}") from None
-    except OutsideRange as error:
-        if speed:  # too hot on the way to the steady state, which says nothing of when that is
+    except (heat.NotSettled, OutsideRange) as error:
+        loads = isinstance(error, heat.NotSettled)
+        why = f"the bearings run away: {error}" if loads else f"the grease or a material is asked for a temperature that its law does not reach: {error}"
+        if speed and (duration is not None or not loads):  # too hot on the way to the steady state, which says nothing of when that is
             try:
                 constant = heat.slowest(model, model.field(model.nodal(start)), drive(0.0, model.nodal(start)))
             except OutsideRange:
                 pass  # it is the start itself
             else:
                 history = marched(TIME_CONSTANTS * constant)
-                after = machine.read.region_means(history.nodal[-1])
-                error = type(error)(f"{error}; after {history.times[-1] / MINUTE:.3g} min nothing has left a law yet, and the warmest, {max(after, key=after.__getitem__)}, is at {max(after.values()):.0f} C, but without a steady state no answer is given")
-        raise type(error)(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; {_remedy(spindle)}") from None
+                if duration is not None:
+                    return answered(history, None, constant, unsteady=why)
+        raise type(error)(f"{where} {why}; {_remedy(spindle)}") from None
     final = model.nodal(field)
     constant = heat.slowest(model, field, drive(0.0, final))
     back = heat.feedback(model, field, lambda nodal: drive(0.0, nodal))
     progress(f"steady state, time constant {constant:.0f} s")
-    whole = TIME_CONSTANTS * constant
-    history = marched(whole)
-    progress(f"temperatures in {len(history.times) - 1} steps")
-    moments = tuple(machine.moment(nodal) for nodal in history.nodal)
-    steady = machine.moment(final)
-    first = tuple(modes(moments[0].point.chain, highest=spindle.hammer.band[1]))
-    followed = _followed(first, [*moments, steady])
-    progress("natural frequencies")
-    return Warmup(spindle, start, air, speed, history, moments, first, followed[:-1], steady, followed[-1], constant, left_out, back)
+    return answered(marched(TIME_CONSTANTS * constant), final, constant, back)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +283,7 @@ def energy(warmup: Warmup) -> dict[str, float]:
 
 def most_friction(warmup: Warmup) -> float:
     """The largest friction heat (W) of all bearings together, at any time or in the end."""
-    return max(sum(m.friction.values()) for m in (*warmup.moments, warmup.steady))
+    return max(sum(m.friction.values()) for m in warmup.every)
 
 
 def roller_names(warmup: Warmup) -> list[str]:

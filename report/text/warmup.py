@@ -54,6 +54,7 @@ def warmup_json(warmup: Warmup) -> dict[str, Any]:
         | {name: rollers(warmup, name) for name in roller_names(warmup)},
         "status": moments[-1].point.state.status,
         "steady": _steady_json(warmup, first),
+        "unsteady": warmup.unsteady,
         "time_constant_s": warmup.time_constant,
         "energy_J": energy(warmup),
         "left_out_effects": list(warmup.left_out),
@@ -66,9 +67,10 @@ def first_row(warmup: Warmup) -> str | None:
     return next((b.name for b in warmup.spindle.bearings), None)
 
 
-def _steady_json(warmup: Warmup, first: str | None) -> dict[str, Any]:
+def _steady_json(warmup: Warmup, first: str | None) -> dict[str, Any] | None:
+    """None where there is none."""
     steady = warmup.steady
-    return {
+    return None if steady is None else {
         "temperature_C": dict(steady.temperatures),
         "bearing_temperature_C": dict(steady.bearing_temperatures),
         "preload_N": None if first is None else steady.preload[first],
@@ -118,14 +120,15 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
         console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
     console.print(f"{told(warmup)}\n", highlight=False, markup=False)
     bearings, of_rollers = [b.name for b in warmup.spindle.bearings], roller_names(warmup)
-    unit, scale = power(max(max(m.friction.values()) for m in (*warmup.moments, warmup.steady)))
+    unit, scale = power(max(max(m.friction.values()) for m in warmup.every))
     columns = ["time\nmin", *(f"{b}\nC" for b in (*bearings, *of_rollers)), "coolest\nC", "hottest\nC", *(f"{b}\npreload\nN" for b in bearings[:1])]
     columns += [*(f"{b}\nclearance\num" for b in of_rollers), *(f"{b}\nfriction\n{unit}" for b in (*bearings, *of_rollers))]
     columns += [f"f{k}\nHz" for k in range(1, len(warmup.modes) + 1)]
     rows = [
         [f"{warmup.times[k] / MINUTE:.2f}", *_cells(warmup.moments[k], bearings, of_rollers, warmup.frequencies[k], scale)] for k in _shown(warmup.times)
     ]
-    show_grid(console, title, columns, [*rows, ["steady", *_cells(warmup.steady, bearings, of_rollers, warmup.steady_frequencies, scale)]])
+    steady = [] if warmup.steady is None else [["steady", *_cells(warmup.steady, bearings, of_rollers, warmup.steady_frequencies, scale)]]
+    show_grid(console, title, columns, [*rows, *steady])
     kinds = ", ".join(f"f{k} {m.kind}" for k, m in enumerate(warmup.modes, 1))
     console.print(f"Bearings, coolest and hottest region; {kinds}.")
     total = heat_sums(warmup)
@@ -141,12 +144,19 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
 
 def told(warmup: Warmup) -> str:
     """Where a warm-up ends, what it passes through on the way, and how near to running away it is."""
-    end, begin = warmup.steady, warmup.moments[0].preload
+    end, begin = warmup.every[-1], warmup.moments[0].preload
     first = max((b.name for b in warmup.spindle.bearings), key=lambda b: abs(end.preload[b] - begin[b]) / max(abs(begin[b]), 1e-9), default=None)
     warm = ", ".join(f"{name} {t:.1f} C" for name, t in end.bearing_temperatures.items()) or f"the hottest region {max(end.temperatures.values()):.1f} C"
     pressed = "" if first is None else _pressed(first, begin[first], end.preload[first])
+    if warmup.steady is None:
+        return " ".join([f"There is no steady state: {warmup.unsteady}. {_at_the_end(warmup)} the bearings are at {warm}{pressed}.", *_on_the_way(warmup)])
     near = f"it is near runaway, {warmup.feedback:.0%} of a load that is added come back as heat" if warmup.feedback > NEAR else "it does not run away"
     return " ".join([f"In the steady state the bearings are at {warm}{pressed}; {near}.", *_on_the_way(warmup)])
+
+
+def _at_the_end(warmup: Warmup) -> str:
+    """When that is which comes last."""
+    return "In the steady state" if warmup.steady is not None else f"After {warmup.times[-1] / MINUTE:.3g} min"
 
 
 def _pressed(name: str, begin: float, end: float) -> str:
@@ -157,21 +167,21 @@ def _pressed(name: str, begin: float, end: float) -> str:
 def _on_the_way(warmup: Warmup) -> list[str]:
     """Sentences on the least and the largest preload of any bearing, and on the mode that is ever furthest from its frequency at the start."""
     said = []
-    loads = [(load, name, _when(warmup, k)) for k, m in enumerate((*warmup.moments, warmup.steady)) for name, load in m.preload.items()]
+    loads = [(load, name, _when(warmup, k)) for k, m in enumerate(warmup.every) for name, load in m.preload.items()]
     if loads:
         (least, low, early), (most, high, late) = min(loads, key=lambda row: row[0]), max(loads, key=lambda row: row[0])
         ends = f"the smallest preload of any bearing is {least:.2f} N ({low}, {early}), the largest {most:.2f} N ({high}, {late})"
         said.append(f"Over the whole warm-up {ends}." if f"{least:.2f}" != f"{most:.2f}" else "The preload of no bearing changes on the way.")
     if (furthest := furthest_mode(warmup)) is not None:
         moment, k = furthest
-        start, there = warmup.frequencies[0, k], _frequencies(warmup)[moment, k]
+        start, there = warmup.frequencies[0, k], warmup.every_frequency[moment, k]
         said.append(f"Of the natural frequencies f{k + 1} ({warmup.modes[k].kind}) moves most: it is {there:.1f} Hz {_when(warmup, moment)}, {there - start:+z.1f} Hz from {start:.1f} Hz at the start.")
     return said
 
 
 def _shifts(warmup: Warmup) -> str:
-    """By what each mode has moved in the steady state, and which none there has the shape of."""
-    shift = warmup.steady_frequencies - warmup.frequencies[0]
+    """By what each mode has moved at the end, and which none there has the shape of."""
+    shift = warmup.every_frequency[-1] - warmup.frequencies[0]
     moved = [f"mode {k} ({escape(m.kind)}) {by:+z.1f}" for k, (m, by) in enumerate(zip(warmup.modes, shift, strict=True), 1) if np.isfinite(by)]
     lost = [f"{k} ({escape(m.kind)})" for k, (m, by) in enumerate(zip(warmup.modes, shift, strict=True), 1) if not np.isfinite(by)]
     said = [f"natural frequencies move by {', '.join(moved)} Hz"] if moved else []
@@ -180,17 +190,12 @@ def _shifts(warmup: Warmup) -> str:
 
 def furthest_mode(warmup: Warmup) -> tuple[int, int] | None:
     """Moment and mode, from 0, of the largest change of a natural frequency since the start; the steady state counts as the last moment. None without modes."""
-    every = _frequencies(warmup)
+    every = warmup.every_frequency
     shift = np.nan_to_num(np.abs(every - every[0]))
     if not shift.size:
         return None
     moment, mode = np.unravel_index(int(np.argmax(shift)), shift.shape)
     return int(moment), int(mode)
-
-
-def _frequencies(warmup: Warmup) -> Array:
-    """Frequencies (moments and the steady state, modes)."""
-    return np.vstack([warmup.frequencies, warmup.steady_frequencies])
 
 
 def _when(warmup: Warmup, moment: int) -> str:
@@ -200,13 +205,13 @@ def _when(warmup: Warmup, moment: int) -> str:
 
 def lost_contact(warmup: Warmup) -> str:
     """From when on which bearings are without contact, and so without preload and stiffness; empty where none ever is."""
-    if (loose := _loose_rollers(warmup)) and all(map(_all_loaded, (*warmup.moments, warmup.steady))):
+    if (loose := _loose_rollers(warmup)) and all(map(_all_loaded, warmup.every)):
         return loose
     lost = [(t, m) for t, m in zip(warmup.times, warmup.moments, strict=True) if not _all_loaded(m)]
     if lost:
         time, moment = lost[0]
         return f"the {moment.point.state.status} at {time / MINUTE:.3g} min: no preload from there on, and frequencies are of a loose spindle"
-    if not _all_loaded(warmup.steady):
+    if warmup.steady is not None and not _all_loaded(warmup.steady):
         return f"in the steady state, after the times computed, the {warmup.steady.point.state.status}"
     return ""
 
@@ -216,7 +221,7 @@ def _loose_rollers(warmup: Warmup) -> str:
     for time, moment in zip(warmup.times, warmup.moments, strict=True):
         if names := loose_rollers(moment):
             return f"from {time / MINUTE:.3g} min on the rollers of {' and '.join(names)} are loose: they carry nothing then"
-    names = loose_rollers(warmup.steady)
+    names = [] if warmup.steady is None else loose_rollers(warmup.steady)
     return f"in the steady state, after the times computed, the rollers of {' and '.join(names)} are loose: they carry nothing" if names else ""
 
 
@@ -257,7 +262,7 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
     from thermospindle.report.figures.common import svg
     from thermospindle.report.figures.warmup import figure as drawn
 
-    last, total = warmup.steady, heat_sums(warmup)
+    last, total = warmup.every[-1], heat_sums(warmup)
     bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
     first = first_row(warmup)
     pressed = "" if first is None else f", the preload of {escape(first)} is {last.preload[first]:.2f} N (at the start {warmup.moments[0].preload[first]:.2f} N)"
@@ -266,7 +271,7 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
     fits = "".join(f", the clearance of the rollers of {escape(b)} {1e6 * clearance(last, b):.1f} µm (at the start {c:.1f} µm)" for b, c in clear.items())
     about = (
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
-        f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C{pressed}{fits} and bearing friction is "
+        f"{warmup.time_constant:.0f} s. {escape(f'There is no steady state: {warmup.unsteady}. ') if warmup.unsteady else ''}{_at_the_end(warmup)} the bearings are at {escape(bearings)} °C{pressed}{fits} and bearing friction is "
         f"{scale * sum(last.friction.values()):.0f} {unit}; {_shifts(warmup)}.</p>"
         f"{''.join(f'<p>{escape(said)}</p>' for said in _on_the_way(warmup))}"
         f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']}; "

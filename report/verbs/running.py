@@ -119,7 +119,7 @@ def warmup(
         out,
         asked,
         lambda folder, _: _write_warmup(found, folder),
-        [*([lost] if lost else []), *doubts(spindle, [m.point for m in (*found.moments, found.steady)])],
+        [*([lost] if lost else []), *doubts(spindle, [m.point for m in found.every])],
     )
 
 

@@ -2,10 +2,12 @@
 
 import re
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tests.conftest import ROOT, coarse_warmups
 from tests.mounting import told_preload
@@ -16,7 +18,8 @@ from thermospindle.model.machine import Addition, Condition, Friction
 from thermospindle.model.material import Law
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
-from thermospindle.report.text.warmup import warmup_section
+from thermospindle.report.log.turning.warmup import summary
+from thermospindle.report.text.warmup import show_warmup, warmup_json, warmup_section
 from thermospindle.sim import warmup as module
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.warmup import energy, warm_up
@@ -279,6 +282,28 @@ def test_rigid_rings_that_run_away_on_the_way_are_told(tmp_path):
     hot, cold, axial_hot, axial_cold = map(float, words.groups())
     assert hot / cold == pytest.approx(axial_hot / axial_cold, rel=0.01)  # both of the same contact angle
     assert cold > 2 * axial_cold
+
+
+def test_without_a_steady_state_the_time_that_is_told_is_answered(tmp_path):
+    """Nothing was, not even of the first minute; the same moments as of a spindle that has one, and what is said of the end is of the last moment."""
+    scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace('preload_kind = "spring" ', 'preload_kind = "rigid" ')
+    (tmp_path / "spindle.toml").write_text("".join(line for line in scene.splitlines(True) if not line.startswith(("sprung_", "preload_rate"))), encoding="utf-8")
+    found = warm_up(load(tmp_path), 120000 * RPM, 20.0, duration=3.0)
+    assert found.steady is None
+    assert found.times[-1] == 3.0
+    assert found.every == found.moments
+    heat_in = energy(found)
+    assert heat_in["motor"] + heat_in["friction"] - heat_in["convection"] == pytest.approx(heat_in["stored"], rel=1e-3)
+    answer = warmup_json(found)
+    assert answer["steady"] is None
+    assert answer["unsteady"] == found.unsteady
+    assert "does not reach" in found.unsteady
+    out = StringIO()
+    show_warmup(Console(file=out, width=200), found)
+    assert f"There is no steady state: {found.unsteady}. After 0.05 min the bearings are at front" in " ".join(out.getvalue().split())
+    assert "\nsteady" not in out.getvalue()
+    assert "After 0.05 min the bearings are at" in warmup_section(found)[1]
+    assert "| | start | 0.05 min |\n|---|---|---|\n" in summary(found)
 
 
 def test_springs_are_no_advice_where_springs_are(tmp_path):

@@ -146,26 +146,28 @@ def key_to_colours(warmup: Warmup) -> rr.Points3D:
 
 
 def summary(warmup: Warmup) -> str:
-    """Markdown: bearings and natural frequencies at the start, at the end and in the steady state, and where the heat went."""
-    spindle, (first, *_, last), steady = warmup.spindle, warmup.moments, warmup.steady
-    lost = lost_contact(warmup)
+    """Markdown: bearings and natural frequencies at the start, at the end and in the steady state, as far as there is one, and where the heat went."""
+    spindle, lost = warmup.spindle, lost_contact(warmup)
+    moments = warmup.every
+    shown = sorted({0, len(warmup.moments) - 1, len(moments) - 1})
     lines = [
         f"**From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.6g} rpm**",
         "",
         *([f"{lost[0].upper()}{lost[1:]}.", ""] if lost else []),
-        f"| | start | {warmup.times[-1] / MINUTE:.3g} min | steady |",
-        "|---|---|---|---|",
+        *([f"There is no steady state: {warmup.unsteady}.", ""] if warmup.unsteady else []),
+        f"| | start | {warmup.times[-1] / MINUTE:.3g} min |" + " steady |" * (len(shown) > 2),
+        "|---|---|---|" + "---|" * (len(shown) > 2),
     ]
     for b in spindle.ringed:
-        lines.append(f"| {b.name}, °C | " + " | ".join(f"{m.bearing_temperatures[b.name]:.2f}" for m in (first, last, steady)) + " |")
+        lines.append(f"| {b.name}, °C | " + " | ".join(f"{moments[k].bearing_temperatures[b.name]:.2f}" for k in shown) + " |")
     for b in spindle.bearings:
-        lines.append(f"| {b.name} preload, N | " + " | ".join(f"{m.preload[b.name]:.2f}" for m in (first, last, steady)) + " |")
+        lines.append(f"| {b.name} preload, N | " + " | ".join(f"{moments[k].preload[b.name]:.2f}" for k in shown) + " |")
     for name in roller_names(warmup):
-        clear = (1e6 * clearance(m, name) for m in (first, last, steady))
+        clear = (1e6 * clearance(moments[k], name) for k in shown)
         lines.append(f"| {name} clearance, µm | " + " | ".join(f"{c:.2f}" for c in clear) + " |")
-    for k, mode in enumerate(warmup.modes):
-        values = (warmup.frequencies[0, k], warmup.frequencies[-1, k], warmup.steady_frequencies[k])
-        lines.append(f"| {k + 1} {mode.kind}, Hz | " + " | ".join(f"{f:.1f}" if np.isfinite(f) else "lost" for f in values) + " |")
+    for number, (mode, frequency) in enumerate(zip(warmup.modes, warmup.every_frequency.T, strict=True), 1):
+        values = frequency[shown]
+        lines.append(f"| {number} {mode.kind}, Hz | " + " | ".join(f"{f:.1f}" if np.isfinite(f) else "lost" for f in values) + " |")
     heat = heat_sums(warmup)
     lines += ["", f"Slowest time constant {warmup.time_constant:.0f} s.", ""]
     lines += [f"Heat: motor {heat['motor']}, bearings {heat['friction']} in; convection {heat['convection']}; stored {heat['stored']}."]
