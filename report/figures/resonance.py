@@ -34,6 +34,7 @@ SIZE = (9.6, 6.2)  # inches
 LINES = 9  # drawn in a diagram, more where more meet a mode at the nominal speed
 MARKED = 6  # coincidences along an axis of the runout, and the nearest
 CURVES = 14  # drawn in the map
+DASHES = ("-", "--", ":")  # of modes that share a colour
 
 
 @rc_context(STYLE)
@@ -155,12 +156,13 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = Fal
     chosen += [c for c in strongest(found.coincidences) if all(_pair(c) != _pair(k) for k in chosen)]
     used = sorted({c.mode.number for c in chosen[:CURVES]})
     paints = {number: MODES[i % len(MODES)] for i, number in enumerate(used)}
+    dashes = {number: DASHES[i // len(MODES) % len(DASHES)] for i, number in enumerate(used)}  # of modes of one colour
     curves = [next(k for k in found.curves if key(k.line) == key(c.line) and k.mode.number == c.mode.number) for c in chosen[:CURVES]]
     axes.set_xlim(*_around([found.nominal.speed, *(s for k in curves for s in k.speed)], found.speeds))
     for c, curve in zip(chosen, curves, strict=False):
         order = np.argsort(curve.temperature)
         paint = paints[c.mode.number]
-        axes.plot(curve.speed[order] / RPM, curve.temperature[order], color=paint, lw=1.2)
+        axes.plot(curve.speed[order] / RPM, curve.temperature[order], color=paint, ls=dashes[c.mode.number], lw=1.2)
         if curve.temperature.max() > found.temperatures[-1] - 1e-9:
             named.append((float(curve.speed[order][-1] / RPM), f"{c.line.name}, {c.mode.number}", paint))
         else:
@@ -177,7 +179,7 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = Fal
     axes.set(xlabel="speed, rpm", ylabel="temperature, °C")
     if not bare:
         figure.suptitle("Where the strongest lines meet a mode (line, mode number)", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
-        handles = [Line2D([], [], color=paints[m.number], label=f"mode {m.number} {m.kind}") for m in found.modes if m.number in paints]
+        handles = [Line2D([], [], color=paints[m.number], ls=dashes[m.number], label=f"mode {m.number} {m.kind}") for m in found.modes if m.number in paints]
         handles += [Line2D([], [], color=INK, marker="s", ls="", ms=5, label="nominal condition"), _at_nominal("nominal speed and temperature"), *_circle([s for *_, s in meeting])]
         figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7.5)
     return figure
