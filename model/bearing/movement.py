@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -53,6 +54,11 @@ class Balance:
     stiffness: Array
     force: Array
 
+    @cached_property
+    def turned(self) -> Array:
+        """The motion (n, rows) the other way round."""
+        return np.ascontiguousarray(self.motion.T)
+
 
 def balanced(balance: Balance, rows: Mapping[str, BallRow], centres: Centres) -> dict[str, float]:
     """Movement (m) of every row's outer ring against its inner one without imbalance; that of balls with inertia is sought from the answer of balls without, whose
@@ -69,12 +75,12 @@ def _stepped(balance: Balance, y: Array, rows: list[BallRow], centres: Centres) 
     here, last = _imbalance(balance, y, rows, centres), 0.0
     for _ in range(MOST):
         move = -_yielding(*here) @ here[0]
-        length = float(np.abs(move).max())
+        length = _largest(move)
         if length <= EXACT or last / 2 < length < ROUNDED:
             return y
         if length**3 <= EXACT * last**2:  # steps that double their digits leave this
             return np.asarray(y + move)
-        if np.abs(here[0]).max() < PUSHED and length > ROUNDED:  # at the end of a play, which steps come near and do not reach
+        if length > ROUNDED and _largest(here[0]) < PUSHED:  # at the end of a play, which steps come near and do not reach
             share, there = BEYOND, _imbalance(balance, y + BEYOND * move, rows, centres)
         else:
             share, there = _along(balance, y, move, float(here[0] @ move), rows, centres)
@@ -84,7 +90,7 @@ def _stepped(balance: Balance, y: Array, rows: list[BallRow], centres: Centres) 
 
 def _along(balance: Balance, y: Array, move: Array, slope: float, rows: list[BallRow], centres: Centres) -> tuple[float, tuple[Array, Array]]:
     """The share of a step at which what is out of balance along it has become less than `STEEP` of what it was, the `slope` at its start; and the imbalance there."""
-    length = float(np.abs(move).max())
+    length = _largest(move)
     least, most, share = 0.0, np.inf, min(1.0, FARTHEST / length)
     while share * length < REACH and share - least > 1e-12 * share:
         there = _imbalance(balance, y + share * move, rows, centres)
@@ -100,11 +106,18 @@ def _imbalance(balance: Balance, y: Array, rows: list[BallRow], centres: Centres
     """Forces (n,) that are not balanced (N), and their derivatives (n, n)."""
     forces, slopes = np.array([centred_axial(row, m, centres) for row, m in zip(rows, (balance.motion @ y).tolist(), strict=True)]).T
     off = forces @ balance.motion + balance.stiffness @ y - balance.force
-    return off, (balance.motion.T * slopes) @ balance.motion + balance.stiffness
+    return off, (balance.turned * slopes) @ balance.motion + balance.stiffness
+
+
+def _largest(values: Array) -> float:
+    """As numpy's of so few numbers, which takes five times as long."""
+    return max(map(abs, values.tolist()))
 
 
 def _yielding(off: Array, stiffness: Array) -> Array:
     """The inverse (n, n) of a stiffness: what hangs loose stays, or goes far where it is pushed."""
+    if len(off) == 1 and stiffness[0, 0] > LOOSE:
+        return np.asarray(1 / stiffness)
     rates, ways = np.linalg.eigh(stiffness)
     if rates[0] > LOOSE:
         return np.asarray((ways / rates) @ ways.T)
