@@ -77,20 +77,24 @@ def search(
     progress("fitted without effects")
     tried = fit_singles(model, none, every, progress, workers)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
-    wider = with_resonance(model, best, workers) if best.mechanisms else None
+    with meanwhile(partial(with_resonance, model, best, workers) if best.mechanisms else _nothing, workers) as wider_of:
+        own = by_own_laws(model, none, tried, every, workers)
+        wider = wider_of()
+    before = model
     if wider is not None:
-        before, model = len(model.parameters), wider[0]
+        model = wider[0]
         none = _without_effects(model)
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
             tried = fit_singles(model, none, every, lambda done: None, workers)  # steps that were counted already
         else:
-            tried = carried_over(model, none, tried, before, workers)
+            tried = carried_over(model, none, tried, len(before.parameters), workers)
     elif best.evidence.learned.errors > STRAIN:
         moves = with_resonance(model, none, workers, moves=True)
         if moves is not None and moves[1].evidence.ln > best.evidence.ln + PLENTY:
             model, none = moves
             tried = fit_singles(model, none, every, lambda done: None, workers)
-    tried = replace(tried, singles=better([*tried.singles, *by_own_laws(model, none, tried, every, workers)]))
+    own = own if model is before else by_own_laws(model, none, tried, every, workers)
+    tried = replace(tried, singles=better([*tried.singles, *own]))
     singles = tried.singles
     pairs = joined(model, none, singles, every, tried.most, tried.expected, workers)
     pairs = better([*pairs, *joined_early(model, none, tried, pairs, every, workers)])
@@ -108,6 +112,10 @@ def search(
     ranked = [h for h in ranked if not _against_its_law(model, none.fit.nuisance, h, laws)]
     hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
     return Search(model, none, hypotheses, tried.screened, _alike(model, none.fit.nuisance, hypotheses), none.evidence.ln - plain.evidence.ln)
+
+
+def _nothing() -> None:
+    return None
 
 
 def _without_effects(model: CampaignModel) -> Hypothesis:
