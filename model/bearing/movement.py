@@ -180,13 +180,17 @@ def _balance(spindle: Spindle, group: Sequence[Bearing]) -> Balance:
     for a, b, k in ties:
         if a in of_part and b in of_part:
             stiffness += k * np.outer(of_part[a] - of_part[b], of_part[a] - of_part[b])
+    held = bool(stiffness.any())  # by joints, which hold what preloads ask of them
     for slides, (bearings, spring) in zip(np.eye(n)[len(parts) :], sprung, strict=True):
         first = spring.rings_of[0]
         motion |= dict.fromkeys(spring.rings_of, slides)
         stiffness += (spring.rate or 0.0) * np.outer(slides - apart[first], slides - apart[first])
-        force += spindle.bearing(first).sense * bearings.preload * slides
+        on_seat = 0.0 if held or spindle.one_way(bearings) else apart[first]
+        force += spindle.bearing(first).sense * bearings.preload * (slides - on_seat)
     for bearings in spindle.sets:
         rows = [spindle.bearing(name) for name in bearings.bearings if name in of]
+        if not held and bearings.spring is not None and not spindle.one_way(bearings):
+            continue  # the spring pushes on its seat, and presses them
         # rows that nothing holds against each other have nothing to be preloaded by
         if spindle.one_way(bearings) or len({frozenset(tied[c] for c in of[b.name]) for b in rows}) == 1:
             force += sum((b.sense * b.preload * motion[b.name] for b in rows if motion[b.name] is apart[b.name]), np.zeros(n))

@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.mounting import sprung
 from thermospindle.model.bearing.ball_row import respond
-from thermospindle.model.bearing.definitions import SENSE
+from thermospindle.model.bearing.definitions import SENSE, PreloadSpring
 from thermospindle.model.bearing.pair import bearing_state, solve
 from thermospindle.model.bearing.row import reference_deformation, reference_motion, row_at
 from thermospindle.model.built.tolerance import scaled_preload
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition, RingMotion
 from thermospindle.model.material import Law
+from thermospindle.model.scene.reading import load
 from thermospindle.model.sense import of_states
+from thermospindle.thermal.expansion import expand
 
 
 def motions(spindle, **moves):
@@ -224,3 +227,13 @@ def test_ball_inertia_at_speed(spindle):
     assert state.bearings[0].preload == pytest.approx(state.bearings[1].preload, rel=1e-6)
     assert abs(b.radial_stiffness / light.bearings[0].radial_stiffness - 1) < 0.05
     assert solve(heavy, Condition(20.0, 0.0), motions(spindle)).bearings[0].stiffness == pytest.approx(light.bearings[0].stiffness)
+
+
+@pytest.mark.parametrize("temperature", [20.0, 45.0])
+def test_a_spring_behind_one_of_two_rows_is_in_balance_with_the_others(temperature):
+    """Of rows that are loaded one way one alone on the spring: the shaft is in balance all the same, and not held by what the rows were drawn with."""
+    whole = load(ROOT / "scenes" / "five_bearing")
+    half = replace(whole, sets=tuple(replace(s, spring=PreloadSpring(("front1",))) if s.name == "front" else s for s in whole.sets))
+    state = solve(half, Condition(temperature), expand(half, temperature))
+    assert state.bearing("front1").preload == pytest.approx(half.set_of("front1").preload, rel=1e-9)
+    assert sum(half.bearing(b.name).sense * b.preload for b in state.bearings) == pytest.approx(0.0, abs=1e-6)
