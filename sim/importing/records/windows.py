@@ -10,6 +10,8 @@ from thermospindle.sim.importing.records.hits import TOUCHING
 
 DECAYED = 1e-3  # of its peak, to which a response has fallen at the end of a record that needs no exponential window
 RINGS = 20.0  # times the mean of a spectrum, by which a line stands above it that is no noise's: of that the largest of 1000 is 7 in the mean
+STAYS = 0.7  # of its power in the middle of the record, from which a line has not decayed
+SKIRT = 4  # lines on either side that a strong tone fills
 ENDS_AT = 0.01  # value of the exponential window at the end of a record that needs one
 REACH = 0.1  # of the largest force spectrum, down to which the hammer excites
 HEARD = 0.7  # coherence, from which a response is that of the hammer
@@ -17,12 +19,24 @@ HEARD = 0.7  # coherence, from which a response is that of the hammer
 
 def end_needed(response: Array) -> float:
     """End value of the exponential window for responses (references, hits, channels, n): one where every one has died away within its record, to `DECAYED` of its peak or to noise, which is spread
-    over all lines of its last twentieth while what still rings stands on a few."""
-    tail = response[..., -response.shape[-1] // 20 :]
+    over all lines of its last twentieth while what still rings stands on a few; or to tones, as of what turns, which are as loud there as in the middle of the record."""
+    n = response.shape[-1]
+    m = -(-n // 20)
+    tail, middle = response[..., -m:], response[..., n // 2 - m : n // 2]
     loud = np.abs(tail).max(axis=(-1, 1)) > DECAYED * np.abs(response).max(axis=(-1, 1))
-    lines = (np.abs(np.fft.rfft(tail - tail.mean(axis=-1, keepdims=True), axis=-1)[..., 1:]) ** 2).sum(axis=1)
+    lines, before = (_power(part) for part in (tail, middle))
+    usual = np.median(lines, axis=-1, keepdims=True)
+    tones = (lines > RINGS * usual) & (lines > STAYS * before) & (before > STAYS * lines)
+    filled = np.any([np.roll(tones, k, axis=-1) for k in range(-SKIRT, SKIRT + 1)], axis=0)
+    lines = np.where(filled, np.minimum(usual, lines), lines)
     rings = (lines.max(axis=-1) > RINGS * lines.mean(axis=-1)) | (lines.shape[-1] < 2 * RINGS)
     return ENDS_AT if bool(np.any(loud & rings)) else 1.0
+
+
+def _power(part: Array) -> Array:
+    """Of the lines (references, channels, m) of a part of a record, over all its hits; tapered, so that a tone between lines stands on three."""
+    m = part.shape[-1]
+    return np.asarray((np.abs(np.fft.rfft((part - part.mean(axis=-1, keepdims=True)) * np.hanning(m + 2)[1:-1], axis=-1)[..., 1:]) ** 2).sum(axis=1))
 
 
 def excited(force: Array, step: float) -> tuple[float, float]:

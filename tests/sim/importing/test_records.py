@@ -290,3 +290,15 @@ def test_a_window_is_for_what_rings_and_not_for_noise():
     for left in (5e-3, 1e-3, 2e-4):
         assert end_needed(np.exp(np.log(left) / t[-1] * t) * np.sin(2 * np.pi * 900 * t) + noise) == 0.01
     assert end_needed((died + noise)[..., :400]) == 0.01
+
+
+@pytest.mark.parametrize("tone", [0.0, 2e-3, 0.05])
+def test_a_window_is_not_for_tones_that_stay(tone):
+    """Unbalance of a running spindle is as loud at the end of a record as in its middle: it had windows put on what had died away. One is put on where a mode still rings beside it."""
+    random, n = np.random.default_rng(6), 16384
+    t = np.arange(n) / 8192
+    phases = 2 * np.pi * random.random((1, 4, 1, 1))
+    turning = tone * sum(np.sin(2 * np.pi * k * 83.3 * t + k * phases) for k in (1, 2)) + 5e-4 * random.standard_normal((1, 4, 3, n))
+    assert end_needed(np.exp(-10 * t) * np.sin(2 * np.pi * 900 * t) + turning) == 1.0
+    for left in (1e-2, 5e-3):
+        assert end_needed(np.exp(np.log(left) / t[-1] * t) * np.sin(2 * np.pi * 900 * t) + turning) == 0.01
