@@ -178,7 +178,7 @@ class Cage:
 def _with_inertia(row: BallRow, line: Array, near: Rolled | None) -> tuple[tuple[Array, ...], Cage | None, Rolled]:
     """As `_massless` at the speed of the cage, with the centre of every ball an unknown of its own; and what the cage does as rings move."""
     lines = [(r, z) for r, z in line.tolist()]
-    speed, found = at_one_speed(row, lines, *(({}, None) if near is None else (dict(zip(lines, near.centres, strict=True)), near.cage)))
+    speed, found = at_one_speed(row, lines) if near is None else at_one_speed(row, lines, dict(zip(lines, near.centres, strict=True)), near.cage)
     balances, each = zip(*(found[at] for at in lines), strict=True)
     stiffness = {at: np.reshape(b.stiffness(), (2, 2)) for at, (b, _) in found.items()}
     told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T

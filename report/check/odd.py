@@ -20,6 +20,7 @@ from thermospindle.report.check.odd_bearings import OF_BEARINGS
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
+from thermospindle.sim.hammer.test import damped_throughout
 from thermospindle.sim.operating import mass_between
 from thermospindle.sim.resonance.critical import criticals
 
@@ -241,8 +242,8 @@ def _hammer(found: Looked) -> Iterator[str]:
     if decay * test.record_length < 3 and test.exponential_end == 1.0:
         yield f"the slowest mode has not died out when the record of {test.record_length:g} s ends; a longer one, or an exponential window, is needed"
     steps = test.hits * len(test.hammer_nodes) * test.record_length / test.step
-    freedom, lossy = len(found.reference.chain.dofs), any(e.loss_factor for e in found.reference.chain.elements)
-    if lossy and freedom > LARGE:
+    freedom = len(found.reference.chain.dofs)
+    if damped_throughout(found.reference.chain.elements, freedom):
         yield f"virtual hammer tests are by --element reduced alone: loss_factor makes dampers between all {freedom} degrees of freedom, which MuJoCo steps for {LARGE} or fewer"
     elif steps > MANY_STEPS and found.spindle.structure.shafts:
         yield f"a virtual hammer test takes {steps / 1e6:.1f} million steps of {1e6 * test.step:.2g} us, for the shortest elements of the shaft: places closer together than longest_element_mm make them, or that itself"

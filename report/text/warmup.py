@@ -149,9 +149,14 @@ def told(warmup: Warmup) -> str:
     warm = ", ".join(f"{name} {t:.1f} C" for name, t in end.bearing_temperatures.items()) or f"the hottest region {max(end.temperatures.values()):.1f} C"
     pressed = "" if first is None else _pressed(first, begin[first], end.preload[first])
     if warmup.steady is None:
-        return " ".join([f"There is no steady state: {warmup.unsteady}. {_at_the_end(warmup)} the bearings are at {warm}{pressed}.", *_on_the_way(warmup)])
+        return " ".join([without_steady(warmup), f"{_at_the_end(warmup)} the bearings are at {warm}{pressed}.", *_on_the_way(warmup)])
     near = f"it is near runaway, {warmup.feedback:.0%} of a load that is added come back as heat" if warmup.feedback > NEAR else "it does not run away"
     return " ".join([f"In the steady state the bearings are at {warm}{pressed}; {near}.", *_on_the_way(warmup)])
+
+
+def without_steady(warmup: Warmup) -> str:
+    """That there is no steady state, and why; empty where there is one."""
+    return f"There is no steady state: {warmup.unsteady}." if warmup.unsteady else ""
 
 
 def _at_the_end(warmup: Warmup) -> str:
@@ -271,7 +276,7 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
     fits = "".join(f", the clearance of the rollers of {escape(b)} {1e6 * clearance(last, b):.1f} µm (at the start {c:.1f} µm)" for b, c in clear.items())
     about = (
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
-        f"{warmup.time_constant:.0f} s. {escape(f'There is no steady state: {warmup.unsteady}. ') if warmup.unsteady else ''}{_at_the_end(warmup)} the bearings are at {escape(bearings)} °C{pressed}{fits} and bearing friction is "
+        f"{warmup.time_constant:.0f} s. {escape(f'{without_steady(warmup)} '.lstrip())}{_at_the_end(warmup)} the bearings are at {escape(bearings)} °C{pressed}{fits} and bearing friction is "
         f"{scale * sum(last.friction.values()):.0f} {unit}; {_shifts(warmup)}.</p>"
         f"{''.join(f'<p>{escape(said)}</p>' for said in _on_the_way(warmup))}"
         f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']}; "

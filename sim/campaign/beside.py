@@ -120,9 +120,9 @@ def far_from(spindle: Spindle, campaign: Campaign) -> list[str]:
     outside = [t for t in campaign.tests if not low - FAR_K <= t.temperature <= high + FAR_K]
     if outside:
         span = " to ".join(f"{v:.4g}" for v in dict.fromkeys((min(t.temperature for t in outside), max(t.temperature for t in outside))))
-        units = {"Fahrenheit": lambda c: (c - 32) / 1.8, "kelvin": lambda c: c - 273.15}
-        as_told = [name for name, of in units.items() if all(low - FAR_K <= of(t.temperature) <= high + FAR_K for t in outside)]
-        asked = f"; as degrees {as_told[0]} they would be near" if as_told == ["Fahrenheit"] else "; in kelvin they would be near" if as_told else ""
+        units = {"in kelvin": lambda c: c - 273.15, "as degrees Fahrenheit": lambda c: (c - 32) / 1.8}
+        near = [how for how, of in units.items() if all(low - FAR_K <= of(t.temperature) <= high + FAR_K for t in outside)]
+        asked = f"; {near[0]} they would be near" if near else ""
         which = f"tests {listed([t.id for t in outside])}" if len(outside) < 4 else f"{len(outside)} tests"
         told.append(f"{which} at {span} C: the scene is for {low:g} to {high:g} C (temperature_range_C){asked}")
     nominal, fastest = abs(spindle.nominal_speed) / RPM, max((abs(t.speed) for t in campaign.tests), default=0.0) / RPM

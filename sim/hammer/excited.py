@@ -41,17 +41,18 @@ def unseen(point: OperatingPoint, band: tuple[float, float], widths: float = 2.0
     At a mode's frequency its own term of an FRF, with those of modes less than so many half-widths away, is below `SEEN` of the whole FRF there: its
     peak is a change of the curve by no more than that.
     """
-    found, m = poles(point.linear), point.measurement
+    within, m = [mode for mode in point.modes if band[0] <= mode.frequency <= band[1]], point.measurement
+    if not within:
+        return []
+    found, at = poles(point.linear), np.array([mode.damped_frequency() for mode in within])
     residues = np.einsum("rk,kh->rhk", m.response_rows @ found.right, found.left @ m.reference_rows.T)
+    whole = np.abs(frf(point.linear, m.response_rows, m.reference_rows, at))
     hidden = []
-    for mode in point.modes:
-        if band[0] <= mode.frequency <= band[1]:
-            at = mode.damped_frequency()
-            near = np.abs(found.value - mode.pole) <= max(widths * abs(mode.pole.real), ONE * abs(mode.pole))
-            own = np.abs((residues[:, :, near] / (1j * HERTZ * at - found.value[near])).sum(-1))
-            whole = np.abs(frf(point.linear, m.response_rows, m.reference_rows, np.array([at]))[:, :, 0])
-            if not np.any(own > SEEN * whole):
-                hidden.append(mode)
+    for k, mode in enumerate(within):
+        near = np.abs(found.value - mode.pole) <= max(widths * abs(mode.pole.real), ONE * abs(mode.pole))
+        own = np.abs((residues[:, :, near] / (1j * HERTZ * at[k] - found.value[near])).sum(-1))
+        if not np.any(own > SEEN * whole[:, :, k]):
+            hidden.append(mode)
     return hidden
 
 

@@ -23,8 +23,10 @@ import numpy as np
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import HammerTest, Spindle
 from thermospindle.model.parallel import cores
+from thermospindle.model.rotor.chain import Element
 from thermospindle.model.rotor.elements import LINEAR, REDUCED
 from thermospindle.model.rotor.poles import LARGE
+from thermospindle.model.structure import Joint
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Measurement
 from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate
@@ -114,8 +116,7 @@ def takes_long(spindle: Spindle, element: str | None, temperatures: int) -> str:
     test = spindle.hammer
     _, steps = sampling(test)
     dofs, hits = sum(len(b.moves) for b in spindle.structure.bodies), test.hits * len(test.hammer_nodes) * temperatures
-    refused = dofs > LARGE and any(j.loss_factor for j in spindle.structure.joints)  # `check_step` says why
-    if (element or usual(test)) != LINEAR or refused or steps * dofs * hits < LONG:
+    if (element or usual(test)) != LINEAR or damped_throughout(spindle.structure.joints, dofs) or steps * dofs * hits < LONG:
         return ""
     return f"MuJoCo takes {steps} steps of {dofs} degrees of freedom for each of {hits} hits, which is minutes of work; --element {REDUCED} computes records of the same linear model without it, in seconds"
 
@@ -161,12 +162,17 @@ def sampling(test: HammerTest) -> tuple[int, int]:
     return every, (round(test.record_length * test.sample_rate) + MARGIN) * every
 
 
+def damped_throughout(elements: Iterable[Element | Joint], freedom: int) -> list[str]:
+    """Groups of elements, or joints, whose loss factors make more dampers between all degrees of freedom than MuJoCo steps: `check_step` says why."""
+    return list(dict.fromkeys(e.group for e in elements if e.loss_factor)) if freedom > LARGE else []
+
+
 def check_step(point: OperatingPoint, step: float, stepless: str) -> None:
     """Refuse a step at which Runge-Kutta 4 would be unstable: |pole| step < 2.78 on the imaginary axis (Hairer & Wanner, IV.2); and loss factors of a flexible shaft, whose
     dampers lie between all its nodes (`model.rotor.loss`): 48,000 places of tendons for 220 degrees of freedom, with which a step takes MuJoCo 78 ms in place of 0.2.
     `stepless` is the option that takes no steps."""
-    lossy, freedom = list(dict.fromkeys(e.group for e in point.chain.elements if e.loss_factor)), len(point.chain.dofs)
-    if lossy and freedom > LARGE:
+    freedom = len(point.chain.dofs)
+    if lossy := damped_throughout(point.chain.elements, freedom):
         raise BadInput(
             f"{point.spindle.file or point.spindle.name}: loss_factor of {' and '.join(lossy)}: makes dampers between all {freedom} degrees of freedom, which MuJoCo steps for {LARGE} or "
             f"fewer; allowed are {stepless}, or damping_ratio in its place"

@@ -23,7 +23,7 @@ from thermospindle.report.log.columns import curve_look, log_curve, log_words, n
 from thermospindle.report.log.content import made_from
 from thermospindle.report.log.drawing import HEAT, heat, light, outlines
 from thermospindle.report.log.views import at, axis, scene, summary_view, window
-from thermospindle.report.text.warmup import heat_sums, lost_contact, rows
+from thermospindle.report.text.warmup import heat_sums, lost_contact, rows, without_steady
 from thermospindle.report.typeset import power
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.warmup import Warmup, clearance, most_friction, roller_names, rollers
@@ -154,7 +154,7 @@ def summary(warmup: Warmup) -> str:
         f"**From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.6g} rpm**",
         "",
         *([f"{lost[0].upper()}{lost[1:]}.", ""] if lost else []),
-        *([f"There is no steady state: {warmup.unsteady}.", ""] if warmup.unsteady else []),
+        *([told, ""] if (told := without_steady(warmup)) else []),
         f"| | start | {warmup.times[-1] / MINUTE:.3g} min |" + " steady |" * (len(shown) > 2),
         "|---|---|---|" + "---|" * (len(shown) > 2),
     ]
