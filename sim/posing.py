@@ -19,6 +19,7 @@ from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import TO_MM
 from thermospindle.sim.operating import OperatingPoint
+from thermospindle.sim.running.lines import slices
 from thermospindle.sim.running.runout import Runout
 
 VISIBLE = 0.16  # largest displacement of an animated mode, of the size of the spindle
@@ -52,19 +53,24 @@ def body_meshes(spindle: Spindle) -> dict[str, list[RegionMesh]]:
     return {b.name: own for b in spindle.structure.bodies if (own := [m for m in meshes if m.body == b.name])}
 
 
-def largest_displacement(point: OperatingPoint, motion: ComplexArray) -> Array:
-    """Largest displacement (frames,) in m of any drawn vertex."""
+def largest_displacement(point: OperatingPoint, motion: Array | ComplexArray) -> Array:
+    """Largest displacement (frames,) in m of any drawn vertex under `motion` (dofs, frames), real or phasors."""
     largest = np.zeros(motion.shape[1])
     for name, meshes in body_meshes(point.spindle).items():
         arm = np.concatenate([m.vertices for m in meshes]) - [0.0, 0.0, point.chain.body(name).z]
         rows = {move: i for i, (body, move) in enumerate(point.linear.dofs) if body == name}
         u = np.array([motion[rows[m]] if m in rows else 0 * motion[0] for m in MOVES])  # (5, frames)
         x, y, z = arm.T
-        lever = np.zeros((len(arm), 3, 5))  # displacement of every vertex from a unit motion
-        lever[:, range(3), range(3)] = 1.0
-        lever[:, 1, 3], lever[:, 2, 3], lever[:, 0, 4], lever[:, 2, 4] = -z, y, z, -x
-        squared = sum((lever.reshape(-1, 5) @ part) ** 2 for part in (u.real, u.imag))
-        largest = np.maximum(largest, np.sqrt(squared.reshape(len(arm), 3, -1).sum(axis=1).max(axis=0)))
+        by_vertex = np.zeros((len(arm), 3, 5))  # displacement of every vertex from a unit motion
+        by_vertex[:, range(3), range(3)] = 1.0
+        by_vertex[:, 1, 3], by_vertex[:, 2, 3], by_vertex[:, 0, 4], by_vertex[:, 2, 4] = -z, y, z, -x
+        lever = by_vertex.reshape(-1, 5)
+        for piece in slices(motion.shape[1], len(lever)):
+            squared = (lever @ u[:, piece].real) ** 2
+            if np.iscomplexobj(motion):
+                squared += (lever @ u[:, piece].imag) ** 2
+            moved = np.sqrt(squared.reshape(len(arm), 3, -1).sum(axis=1).max(axis=0))
+            largest[piece] = np.maximum(largest[piece], moved)
     return largest
 
 
@@ -89,7 +95,7 @@ def _turning(frames: int) -> ComplexArray:
     return np.exp(2j * np.pi * np.arange(frames) / CYCLE)
 
 
-def poses(point: OperatingPoint, motion: ComplexArray) -> Poses:
+def poses(point: OperatingPoint, motion: Array | ComplexArray) -> Poses:
     """The pose of every body relative to rest."""
     model = point.model
     data = mujoco.MjData(model)
@@ -122,9 +128,9 @@ def turning_poses(runout: Runout, share: float = VISIBLE_TURNING) -> tuple[Poses
     `share` of the section's radius."""
     point, frames = runout.point, frame_indices(runout)
     motion = runout.signals.motion[frames].T
-    largest = float(largest_displacement(point, motion.astype(complex)).max())
+    largest = float(largest_displacement(point, motion).max())
     factor = round_down(share * reach(point.spindle) / largest) if largest > 0 else 1.0
-    moved = poses(point, (factor * motion).astype(complex))
+    moved = poses(point, factor * motion)
     for body in point.chain.bodies:
         if body.turns:
             translation, turn = moved[body.name]

@@ -25,6 +25,7 @@ LEAST = 0.01  # of the strongest line, and
 ABOVE_FLOOR = 6.0  # times the median of the residual's spectrum: smallest peak that is called an unexplained line
 ROUNDING = 1e-6  # of the strongest line of all: below it a line is rounding
 MOST = 20  # unexplained lines looked for
+SLICE = 2_000_000  # numbers held at a time of what is worked out for every sample
 MOST_WHOLE = 300  # multiples looked for where what is seen turns more slowly than the spindle, beyond those of the spindle and of theory
 
 
@@ -75,17 +76,30 @@ def fit(time: Array, value: Array, frequency: Array) -> Fit:
     if 2 * k + 1 > n:
         raise ValueError(f"{k} lines cannot be estimated from {n} samples")
     middle = (time[0] + time[-1]) / 2
-    turn = 2 * np.pi * np.outer(frequency, time - middle)
-    basis = np.vstack([np.cos(turn), -np.sin(turn), np.ones((1, n))])
-    scale = 1 / np.linalg.norm(basis, axis=1)
-    basis *= scale[:, None]
-    eigen, vectors = np.linalg.eigh(basis @ basis.T)
+    pieces = slices(n, 2 * k + 1)
+
+    def basis(piece: slice) -> Array:
+        turn = 2 * np.pi * np.outer(frequency, time[piece] - middle)
+        return np.vstack([np.cos(turn), -np.sin(turn), np.ones((1, turn.shape[1]))])
+
+    square, projected = np.zeros((2 * k + 1, 2 * k + 1)), np.zeros((2 * k + 1, len(value)))
+    for piece in pieces:
+        rows = basis(piece)
+        square += rows @ rows.T
+        projected += rows @ value[:, piece].T
+    scale = 1 / np.sqrt(np.diag(square))
+    eigen, vectors = np.linalg.eigh(square * np.outer(scale, scale))
     kept = eigen > CUTOFF * eigen[-1]
-    found = (vectors[:, kept] / eigen[kept]) @ (vectors[:, kept].T @ (basis @ value.T))
-    residual = value - (found.T @ basis)
-    found = found.T * scale
+    found = (((vectors[:, kept] / eigen[kept]) @ (vectors[:, kept].T @ (scale[:, None] * projected))) * scale[:, None]).T
+    residual = value - np.hstack([found @ basis(piece) for piece in pieces])
     phasor = (found[:, :k] + 1j * found[:, k : 2 * k]) * np.exp(-2j * np.pi * frequency * middle)
     return Fit(np.asarray(frequency), phasor, found[:, -1], residual)
+
+
+def slices(samples: int, each: int) -> list[slice]:
+    """A record in slices, of each of whose samples so many numbers are worked out at a time."""
+    length = max(1, SLICE // max(each, 1))
+    return [slice(first, first + length) for first in range(0, samples, length)]
 
 
 def distinct(frequency: Array, length: float) -> Array:

@@ -26,7 +26,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Harmonics, harmonics, response
-from thermospindle.sim.running.lines import HIGHEST, Fit, FoundLine, find_lines
+from thermospindle.sim.running.lines import HIGHEST, Fit, FoundLine, find_lines, slices
 from thermospindle.sim.running.probes import Probe, all_probes, hub_probes, looked_at, probe_rows, speed_ratio
 from thermospindle.sim.running.revolutions import (
     ErrorMotion,
@@ -142,10 +142,10 @@ def measured(record: RunningRecord, probes: Sequence[Probe]) -> Signals:
 def linear(point: OperatingPoint, probes: Sequence[Probe], time: Array, excited: Harmonics | None = None) -> Signals:
     """What probes see in the steady state of the linear model, at `time` (n,) s."""
     excited = harmonics(point) if excited is None else excited
-    motion = np.zeros((len(time), len(point.chain.dofs)))
-    for phasor, frequency in zip(response(point, excited), excited.frequency, strict=True):
-        turned = 2 * np.pi * frequency * time
-        motion += np.outer(np.cos(turned), phasor.real) - np.outer(np.sin(turned), phasor.imag)
+    phasor, motion = response(point, excited), np.zeros((len(time), len(point.chain.dofs)))
+    for piece in slices(len(time), len(phasor)):
+        turned = 2 * np.pi * np.outer(time[piece], excited.frequency)
+        motion[piece] = np.cos(turned) @ phasor.real - np.sin(turned) @ phasor.imag
     return Signals(tuple(probes), time, point.condition.speed * time, probe_rows(point, probes) @ motion.T, motion)
 
 
