@@ -37,8 +37,8 @@ from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, checked
 from thermospindle.sim.effects.effect import fitted_to, refusal
-from thermospindle.sim.effects.known import equipped
-from thermospindle.sim.effects.own import effect_of, installed
+from thermospindle.sim.effects.known import equipped, of_file
+from thermospindle.sim.effects.own import installed
 from thermospindle.sim.hammer.test import ImpactTest, impact_tests
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.identification.modal import Modes, extract
@@ -230,7 +230,7 @@ def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> S
     """
     drawing = _spindle(spindle)
     of_kind("effect", effect, (str, Path), "the name of an effect, or the path of a file of your own")
-    found = fitted_to(effect_of(effect) if isinstance(effect, Path) else by_name(effect, (*CATALOGUE, *installed())), drawing)
+    found = fitted_to(of_file(effect, drawing) if isinstance(effect, Path) else by_name(effect, (*CATALOGUE, *installed())), drawing)
     if why := refusal(found, drawing):
         raise BadInput(f"effect {found.name}: {why}")
     if any(a.effect == found.name for a in drawing.effects):

@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from thermospindle.model.errors import BadInput, instead
 from thermospindle.model.files.formats import SCENE
 from thermospindle.model.machine import Addition, Spindle
@@ -38,49 +40,66 @@ def variant(raw: Mapping[str, Any], file: Path, catalogue: Sequence[Effect], cho
     `structure.joints.base.lateral_N_per_m`; `effects.NAME.PARAMETER` is one of an effect, which the scene takes in where it has it not,
     its other parameters typical.
     """
-    changed = copy.deepcopy(dict(raw))
     of_effects: dict[str, dict[str, float]] = {}
     for key, value in chosen.items():
-        parts = key.split(".")
-        if parts[0] == EFFECTS:
+        if (parts := key.split("."))[0] == EFFECTS:
             of_effects.setdefault(parts[1], {})[parts[2]] = value
-        else:
-            _table(changed, parts[:-1], key)[parts[-1]] = value
-    spindle = build(changed, file)
+    spindle = build(_changed(raw, {key: value for key, value in chosen.items() if key.split(".")[0] != EFFECTS}), file)
     return _with_effects(spindle, of_effects, catalogue)
 
 
 def with_values(spindle: Spindle, catalogue: Sequence[Effect], values: Mapping[str, Any]) -> Spindle:
-    """A spindle that was read from a file, with other values of its keys and of effects' parameters; `BadInput` for what its file could not say."""
+    """A spindle that was read from a file, with other values of its keys and of effects' parameters, all together; `BadInput` for what its file could not say."""
     assert spindle.file is not None
-    raw = read_file(SCENE, spindle.file)
-    for key, value in values.items():
+    raw, file = read_file(SCENE, spindle.file), spindle.file
+    chosen = {str(key): _plain(value) for key, value in values.items()}
+
+    def found(of: Mapping[str, Any]) -> Spindle:
+        for key, value in of.items():
+            if key.split(".")[0] == EFFECTS:
+                _check_effect(spindle, key.split("."), [value], catalogue)
+        return variant(raw, file, catalogue, of)
+
+    def refused(of: Mapping[str, Any]) -> BadInput | None:
         try:
-            _check(raw, spindle.file, spindle, catalogue, str(key), [value])
+            found(of)
         except BadInput as error:
-            raise BadInput(f"values[{key!r}]: {error}") from None
-    return variant(raw, spindle.file, catalogue, values)
+            return error
+        return None
+
+    try:
+        return found(chosen)
+    except BadInput as error:
+        if len(chosen) == 1:
+            raise BadInput(f"values[{next(iter(chosen))!r}]: {error}") from None
+        alone = next((key for key in chosen if not refused({k: v for k, v in chosen.items() if k != key})), None)  # without which all is well
+        raise BadInput(f"values{'' if alone is None else f'[{alone!r}]'}: {error}") from None
+
+
+def _plain(value: Any) -> Any:
+    """A value as a file would have it: NumPy's numbers and arrays as Python's."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return {k: _plain(v) for k, v in value.items()} if isinstance(value, Mapping) else value
 
 
 def check(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, catalogue: Sequence[Effect]) -> None:
-    """Refuse (`BadInput`) keys that are none of the scene, and values that its form or an effect does not allow, each by itself.
+    """Refuse (`BadInput`) keys that are none of the scene, and values that its form or an effect does not allow, by themselves or beside the others' first or last ones.
 
     Values that only together give no spindle are rows of the study with their error.
     """
+    others = [{key: values[at] for key, values in study.vary if key.split(".")[0] != EFFECTS} for at in (0, -1)]
     for key, values in study.vary:
         try:
-            _check(raw, file, spindle, catalogue, key, values)
+            if key.split(".")[0] == EFFECTS:
+                _check_effect(spindle, key.split("."), values, catalogue)
+            else:
+                for value in values:
+                    _check_value(raw, file, key, value, others)
         except BadInput as error:
             raise BadInput(f"{study.file}: vary.{key!r}: {error}") from None
-
-
-def _check(raw: Mapping[str, Any], file: Path, spindle: Spindle, catalogue: Sequence[Effect], key: str, values: Sequence[Any]) -> None:
-    parts = key.split(".")
-    if parts[0] == EFFECTS:
-        _check_effect(spindle, parts, values, catalogue)
-        return
-    for value in values:
-        _check_value(raw, file, key, value)
 
 
 def _check_effect(spindle: Spindle, parts: list[str], values: Sequence[Any], catalogue: Sequence[Effect]) -> None:
@@ -98,11 +117,26 @@ def _check_effect(spindle: Spindle, parts: list[str], values: Sequence[Any], cat
         checked(effect, {parts[2]: value})
 
 
-def _check_value(raw: Mapping[str, Any], file: Path, key: str, value: Any) -> None:
+def _check_value(raw: Mapping[str, Any], file: Path, key: str, value: Any, others: Sequence[Mapping[str, Any]]) -> None:
+    """`BadInput` where a value fits the form neither by itself nor with any of the `others`; what is wrong with it by itself is told."""
+    refused = None
+    for beside in ({}, *others):
+        try:
+            formed(_changed(raw, {**beside, key: value}), file)
+            return
+        except BadInput as error:
+            refused = refused or error
+    if refused:
+        raise refused
+
+
+def _changed(raw: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """The parsed scene with keys at chosen values."""
     changed = copy.deepcopy(dict(raw))
-    parts = key.split(".")
-    _table(changed, parts[:-1], key)[parts[-1]] = value
-    formed(changed, file)
+    for key, value in chosen.items():
+        *table, last = key.split(".")
+        _table(changed, table, key)[last] = value
+    return changed
 
 
 def _table(raw: dict[str, Any], parts: Sequence[str], key: str) -> dict[str, Any]:
