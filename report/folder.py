@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.files.whole import check_not_here, whole
+from thermospindle.model.files.whole import ATTEMPTS, check_not_here, whole
 
 MARK = "made-by-spindle.json"
 """File that every output folder holds: how it was made, its answer, and a digest of every file that was written beside it."""
@@ -25,7 +25,7 @@ def check_folder(path: Path, scene: bool = False) -> None:
     """`BadInput` if something stands at `path` that spindle did not write, or that was changed since; or a scene, in whose place only another `scene` comes."""
     path = path.resolve()
     check_not_here(path)  # before what it holds is looked at
-    _refuse_foreign(path)
+    _refuse_foreign_now(path)
     if not scene and (path / "spindle.toml").is_file():
         raise BadInput(f"--out {path}: holds a scene, spindle.toml; name a new or empty folder")
     for parent in path.parents:
@@ -58,6 +58,27 @@ def _call(options: Mapping[str, Any]) -> str:
     """The call of a verb's function from Python."""
     said = (f"{name}={(str(value) if isinstance(value, Path) else value)!r}" for name, value in options.items() if name != "verb")
     return f"{options['verb']}({', '.join(said)})"
+
+
+def _refuse_foreign_now(path: Path) -> None:
+    """`_refuse_foreign`, of what stood there all the while: another writer may have exchanged it meanwhile."""
+    for _ in range(ATTEMPTS):
+        before = _identity(path)
+        try:
+            _refuse_foreign(path)
+            return
+        except (BadInput, OSError):
+            if _identity(path) == before:
+                raise
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """What stands at a path, whatever it holds; None where nothing does."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _refuse_foreign(path: Path) -> None:

@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 import skfem
 from skfem import MeshTri
 
+from thermospindle.model import material
 from thermospindle.model.files import kept
+from thermospindle.model.rotor import section as drawn_section
 from thermospindle.thermal.elastic import Race, Response
 from thermospindle.thermal.mesh import PartMesh
 from thermospindle.thermal.reduced import Reduced, Region
@@ -79,5 +82,6 @@ def _write(question: str, section: PartMesh, races: Sequence[Race], more: dict[s
 
 
 def _code() -> str:
-    """The text of this package and the version of the finite-element library."""
-    return skfem.__version__ + kept.code(Path(__file__).parent)
+    """The text of this package and of what it asks of others, and the versions of the libraries."""
+    libraries = f"{skfem.__version__} {np.__version__} {scipy.__version__}"
+    return libraries + kept.code(Path(__file__).parent) + "".join(Path(str(m.__file__)).read_text(encoding="utf-8") for m in (material, drawn_section))

@@ -46,7 +46,7 @@ def trusted(place: Path) -> bool:
         try:
             info = folder.stat()
         except OSError:
-            return True  # is not there: nothing is read, and what is made is this user's
+            continue  # is not there: what is made is this user's, in what is above it
         shared = info.st_mode & stat.S_IWOTH or (info.st_mode & stat.S_IWGRP and info.st_gid not in (0, os.getegid()))
         if info.st_uid not in (0, os.geteuid()) or (shared and not (folder != place and info.st_mode & stat.S_ISVTX)):
             warnings.warn(f"{folder}: belongs to another user, or others may write there; nothing of {place} is used, and all is computed anew", stacklevel=2)

@@ -13,6 +13,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import EEXIST, ENOENT, ENOTEMPTY
 from glob import escape
 from pathlib import Path
 
@@ -23,6 +24,8 @@ try:
 except ImportError:  # Windows: without locks of folders, what killed runs left is not told from what others write, and stays
     fcntl = None  # type: ignore[assignment]
 
+HELD = -1
+ATTEMPTS = 100  # to put something where other writers put theirs, too
 NEW, OLD = "new", "old"
 """Folders of a work folder: what is being written, and what it replaces; the thing in each has the name of its place."""
 
@@ -59,17 +62,30 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def _exchange(path: Path, new: Path, old: Path) -> None:
-    """Put `new` in the place of `path`; `old` keeps what stood there, and goes back if `new` cannot be moved."""
-    if not path.is_dir():
-        os.replace(new, path)
-        return
+    """Put `new` in the place of `path`; `old` keeps what stood there, and goes back if `new` cannot be moved. Of several writers the last one's stays, whole."""
     old.parent.mkdir()
-    os.replace(path, old)
-    try:
-        os.replace(new, path)
-    except BaseException:
+    for attempt in range(ATTEMPTS):
+        moved = False
+        try:
+            if path.is_dir():
+                os.replace(path, old)
+                moved = True
+            os.replace(new, path)
+            return
+        except OSError as error:  # another writer has taken away what stood here, or put its own
+            if error.errno not in (ENOENT, ENOTEMPTY, EEXIST) or not new.exists() or attempt == ATTEMPTS - 1:
+                _put_back(old, path, moved)
+                raise OSError(error.errno, error.strerror, str(path)) if error.errno else error from None
+        except BaseException:
+            _put_back(old, path, moved)
+            raise
+        if moved:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+def _put_back(old: Path, path: Path, moved: bool) -> None:
+    if moved and not path.exists():
         os.replace(old, path)
-        raise
 
 
 def _prefix(path: Path) -> str:
@@ -86,9 +102,9 @@ def _work_folder(path: Path) -> tuple[Path, int | None]:
             error.filename = str(path)  # nobody has asked for the work folder
             raise
         lock = _lock(work)
-        if fcntl is None or (lock is not None and work.exists()):
+        if lock is None or (lock >= 0 and work.exists()):
             return work, lock
-        if lock is not None:
+        if lock >= 0:
             os.close(lock)
 
 
@@ -105,8 +121,8 @@ def _clear(folder: Path, pattern: str) -> None:
     """Put back what killed runs had moved away, and remove their work folders."""
     for work in folder.glob(pattern):
         lock = _lock(work)
-        if lock is None:
-            continue  # another process is writing there
+        if lock is None or lock < 0:
+            continue  # another process is writing there, or nobody can tell
         try:
             for old in (work / OLD).glob("*"):
                 if not (place := folder / old.name).exists():
@@ -120,10 +136,10 @@ def _clear(folder: Path, pattern: str) -> None:
 def alone(folder: Path) -> Iterator[None]:
     """The only process that writes into a folder bit by bit; `BadInput` where another one does, until it ends or dies.
 
-    Without locks of folders (Windows) nothing is said.
+    Without locks of folders (Windows, some network drives) nothing is said.
     """
     held = _lock(folder)
-    if held is None and fcntl is not None:
+    if held == HELD:
         raise BadInput(f"{folder}: another run is writing there; wait for it to end, or name another folder")
     try:
         yield
@@ -132,16 +148,17 @@ def alone(folder: Path) -> Iterator[None]:
             os.close(held)
 
 
-def _lock(work: Path) -> int | None:
-    """A descriptor that holds the lock of a work folder until it is closed or the process ends; None where another has it."""
+def _lock(folder: Path) -> int | None:
+    """A descriptor that holds the lock of a folder until it is closed or the process ends; `HELD` where another process has it or the folder is gone, and None where folders have no locks."""
     if fcntl is None:
         return None
-    descriptor = -1
     try:
-        descriptor = os.open(work, os.O_RDONLY)
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        descriptor = os.open(folder, os.O_RDONLY)
     except OSError:
-        if descriptor >= 0:
-            os.close(descriptor)
-        return None
+        return HELD
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(descriptor)
+        return HELD if isinstance(error, BlockingIOError) else None
     return descriptor

@@ -23,6 +23,7 @@ from matplotlib.image import AxesImage
 from matplotlib.ticker import LogLocator, NullLocator
 from scipy.optimize import isotonic_regression
 
+from thermospindle.model.files.whole import whole
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.typeset import LINEAR, SMALLEST
@@ -96,8 +97,10 @@ def save(figure: Figure, folder: Path, name: str, dpi: float = 150) -> None:
     with rc_context(DRAWN):
         laid_out(figure)
         look: dict[str, Any] = {"dpi": dpi, "facecolor": "white", "bbox_inches": "tight"}  # tight: no name beside the axes is cut off
-        figure.savefig(folder / f"{name}.png", **look)
-        figure.savefig(folder / f"{name}.svg", **look, metadata={"Date": None})
+        with whole(folder / f"{name}.png") as file:
+            figure.savefig(file, **look)
+        with whole(folder / f"{name}.svg") as file:
+            figure.savefig(file, **look, metadata={"Date": None})
 
 
 def save_all(figures: Mapping[str, Figure], folder: Path, dpi: float = 150) -> None:

@@ -20,6 +20,7 @@ from rerun.chunk import RrdReader
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.apart import read_apart
 from thermospindle.model.types import Array
+from thermospindle.sim.campaign.form import plain_name
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.identification.peak import Peak
 
@@ -106,7 +107,12 @@ class Log:
 
     @cached_property
     def frfs(self) -> dict[str, Frf]:
-        """By test."""
+        """By test; BadInput for an id that is no plain name, as those of a campaign's tests are: files are called by it."""
+        for _, about in self.tests:
+            try:
+                plain_name(about["id"][0])
+            except ValueError as error:
+                raise BadInput(f"{self.path}: the test {about['id'][0]!r}: {error}") from None
         return {about["id"][0]: self._frf(entity, about) for entity, about in self.tests}
 
     def _frf(self, entity: str, about: Mapping[str, list[Any]]) -> Frf:

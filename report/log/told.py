@@ -3,30 +3,45 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from thermospindle.model.errors import BadInput
 from thermospindle.model.units import RPM, TO_NM, in_rpm
-from thermospindle.report.log.read import Log
+from thermospindle.report.log.read import APPLICATION, Log
 from thermospindle.report.typeset import known, write_csv
+
+
+@contextmanager
+def _as_described(log: Log) -> Iterator[None]:
+    """`BadInput` where what a log holds is not what it says of itself."""
+    try:
+        yield
+    except (KeyError, IndexError, TypeError, ValueError, OverflowError) as error:
+        if isinstance(error, BadInput):
+            raise
+        raise BadInput(f"{log.path}: is not a whole log of {APPLICATION}: what it holds is not what it says of itself ({error})") from None
 
 
 def log_json(log: Log) -> dict[str, Any]:
     """What a log holds, with its numbers as nested lists."""
-    return {"scene": log.scene, "entities": list(log.entities), **SHOW[log.kind][0](log)}
+    with _as_described(log):
+        return {"scene": log.scene, "entities": list(log.entities), **SHOW[log.kind][0](log)}
 
 
 def describe(log: Log) -> str:
     """What a log holds, for the terminal."""
-    lines = [
-        f"{log.path}: {log.about['title']}",
-        f"  scene {log.scene}, recording {log.recording}, {'with' if log.blueprint else 'without'} a blueprint",
-        f"  timelines: {', '.join(log.timelines)}",
-    ]
-    return "\n".join([*lines, *(f"  {line}" for line in SHOW[log.kind][1](log))])
+    with _as_described(log):
+        lines = [
+            f"{log.path}: {log.about['title']}",
+            f"  scene {log.scene}, recording {log.recording}, {'with' if log.blueprint else 'without'} a blueprint",
+            f"  timelines: {', '.join(log.timelines)}",
+        ]
+        return "\n".join([*lines, *(f"  {line}" for line in SHOW[log.kind][1](log))])
 
 
 def _run_json(log: Log) -> dict[str, Any]:

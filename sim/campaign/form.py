@@ -133,6 +133,11 @@ def in_unit(value: float, unit: float) -> float:
     return next((x for x in candidates if x * unit == value), near)
 
 
+def _quoted(text: str) -> str:
+    """A string as TOML has it: as JSON does, but for DEL, which JSON takes as it is."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
 def toml(value: Any) -> str:
     """A TOML value on one line."""
     match value:
@@ -143,12 +148,12 @@ def toml(value: Any) -> str:
         case float():
             return float.__repr__(value)
         case str():
-            return json.dumps(value, ensure_ascii=False)
+            return _quoted(value)
         case date() | time():
             return value.isoformat()
         case list() | tuple():
             return f"[{', '.join(map(toml, value))}]"
         case Mapping():
-            return "{ " + ", ".join(f"{json.dumps(k, ensure_ascii=False)} = {toml(v)}" for k, v in value.items()) + " }"
+            return "{ " + ", ".join(f"{_quoted(k)} = {toml(v)}" for k, v in value.items()) + " }"
         case _:
             raise BadInput(f"conditions: {value!r}: a {type(value).__name__} cannot be written to campaign.toml")

@@ -85,13 +85,13 @@ def _cells(file: Path, columns: tuple[str, ...], form: type[BaseModel]) -> Itera
     if not file.is_file():
         raise BadInput(f"{file}: {absent(file)}")
     try:
-        reader = csv.reader(file.read_text(encoding="utf-8").splitlines(), strict=True)
+        reader = csv.reader(file.read_text(encoding="utf-8-sig").splitlines(), strict=True)
         lines = [(reader.line_num, line) for line in reader]
     except (UnicodeDecodeError, csv.Error) as error:
         raise BadInput(f"{file}: not a CSV file in UTF-8: {error}") from None
     if not lines or tuple(lines[0][1]) != columns:
         raise BadInput(f"{file}: line 1: the columns must be {','.join(columns)}")
-    for number, line in lines[1:]:
+    for number, line in filter(lambda row: row[1], lines[1:]):  # empty lines say nothing
         where = f"{file}: line {number}"
         if len(line) != len(columns):
             raise BadInput(f"{where}: has {len(line)} cells; {len(columns)} are needed")

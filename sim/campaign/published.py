@@ -43,7 +43,7 @@ def read_published(path: Path) -> Published:
     if not path.is_file():  # a pipe would be waited for
         raise BadInput(f"{path}: no such file")
     try:
-        text = path.read_text(encoding="utf-8").splitlines()
+        text = path.read_text(encoding="utf-8-sig").splitlines()
         reader = csv.DictReader(line for line in text if line and not line.startswith("#"))
         names, rows = reader.fieldnames or (), list(reader)
     except (OSError, UnicodeDecodeError, csv.Error) as error:

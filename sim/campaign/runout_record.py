@@ -114,7 +114,7 @@ def check_runout(file: str | Path, record: RunoutRecord, speed: float) -> None:
 
 def _from_csv(file: Path, points: Sequence[Point]) -> RunoutRecord:
     try:
-        lines = file.read_text(encoding="utf-8").splitlines()
+        lines = file.read_text(encoding="utf-8-sig").rstrip().splitlines()
     except UnicodeDecodeError as error:
         raise BadInput(f"{file}: not a CSV file in UTF-8: {error}") from None
     names = [cell.strip() for cell in lines[0].split(",")] if lines else [""]

@@ -169,7 +169,10 @@ def settings_of(form: MappingForm, file: Path) -> FileForm:
             own["columns"] = {**told.get("columns", {}), **own.get("columns", {})}
             own["leave_out"] = [*told.get("leave_out", []), *own.get("leave_out", [])]
             told |= own | {"file": file.name}
-    return FileForm.model_validate(told)
+    try:
+        return FileForm.model_validate(told)
+    except ValidationError as error:
+        raise BadInput(first_error(str(file), told, FileForm, error)) from None
 
 
 def told_of(form: MappingForm, name: str) -> TestForm:

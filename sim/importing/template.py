@@ -77,7 +77,7 @@ def _shared(questions: Sequence[Question], files: Sequence[Path]) -> tuple[dict[
     common: dict[str, list[Question]] = {}
     own: dict[Path, list[Question]] = {f: [] for f in files}
     for q in questions:
-        about = [f for f in files if f.name in q.about.split(", ")]
+        about = [f for f in files if f", {f.name}, " in f", {q.about}, "]
         for suffix in dict.fromkeys(f.suffix for f in about):
             alike = [f for f in files if f.suffix == suffix]
             if q.key in ("records", "test"):

@@ -1,5 +1,6 @@
 """Written whole or not at all: what fails, what is killed, and what is left of it."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import pyarrow as pa
 import pytest
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files import whole as whole_files
 from thermospindle.model.files.whole import whole
 from thermospindle.sim.study.parts import opened, write_table
 
@@ -105,3 +107,37 @@ def test_what_killed_runs_left_of_a_study_goes_when_it_is_gone_on_with(tmp_path)
     with opened(tmp_path / "study", {"study": "a"}, 4, 2, pa.schema({})) as folder:
         assert not any(place.parent.exists() for place in left)
         assert folder.part(0).exists()
+
+
+def test_where_folders_have_no_locks_things_are_written_all_the_same(tmp_path, monkeypatch):
+    """As on some network drives: no lock is not a lock that another has."""
+
+    def unsupported(*asked):
+        raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
+
+    monkeypatch.setattr(whole_files.fcntl, "flock", unsupported)
+    write(tmp_path / "a", "new")
+    assert (tmp_path / "a" / "text").read_text() == "new"
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+    with whole_files.alone(tmp_path):
+        pass
+
+
+RACE = """
+import sys
+from pathlib import Path
+from thermospindle.report.folder import mark, whole_folder
+for k in range(60):
+    with whole_folder(Path(sys.argv[1]) / "out") as folder:
+        for name in "abc":
+            (folder / name).write_text(f"{sys.argv[2]} {k}")
+        mark(folder, {"verb": "race"}, {})
+"""
+
+
+def test_of_several_writers_the_last_ones_folder_stands_whole(tmp_path):
+    writers = [subprocess.Popen([sys.executable, "-c", RACE, str(tmp_path), str(k)], cwd=ROOT, stderr=subprocess.PIPE, text=True) for k in range(3)]
+    said = [writer.communicate()[1] for writer in writers]
+    assert [writer.returncode for writer in writers] == [0, 0, 0], said
+    assert len({(tmp_path / "out" / name).read_text() for name in "abc"}) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]

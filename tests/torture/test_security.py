@@ -112,6 +112,12 @@ class TestCache:
             assert not files.trusted(place)
         tmp_path.chmod(0o700)
 
+    def test_nor_one_that_is_not_there_yet_in_such_a_folder(self, place, tmp_path):
+        tmp_path.chmod(0o777)
+        with pytest.warns(UserWarning, match="others may write there"):
+            assert not files.trusted(place / "deeper")
+        tmp_path.chmod(0o700)
+
     def test_what_is_planted_is_not_read_and_the_answer_is_the_same(self, place, spindle):
         from thermospindle.thermal import influence
         from thermospindle.thermal.expansion import expand

@@ -6,7 +6,7 @@ H1, H2 and Hv (their geometric mean, with the phase of H1) are Bendat & Piersol,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -64,14 +64,14 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     """
     for path, motions in files:
         check_numbers(path, motions)
-    every = ", ".join(dict.fromkeys(path.name for path, _ in files))
-    name = listed(every.split(", "))
+    names = list(dict.fromkeys(path.name for path, _ in files))
+    every, name = ", ".join(names), listed(names)
     moving = [m for m in files[0][1] if not m.force]
-    scales = _scales(files[0][1])
-    if (question := _apart(files, every)) is not None or scales is None:
+    scales = [_scales(motions) for _, motions in files]
+    if (question := _apart(files, every)) is not None or None in scales:
         return FromRecords((), 0.0, 0, (), () if question is None else (question,))
     step = min(m.step for _, motions in files for m in motions)
-    good, hits, notes = _usable(files, step, form)
+    good, hits, notes = _usable(files, [s for s in scales if s is not None], step, form)
     if not good:
         why = dict.fromkeys(n.split(": left out, ")[-1] for n in notes if ": left out, " in n)
         what = f"all {hits} hits are left out ({listed(why, 3)})" if hits else "no hit is found in its force"
@@ -80,8 +80,8 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
         to = reference.label if reference.direction else "its point"
         notes.append(f"{name}: the force of {against} of {len(good)} hits is recorded negative, and is taken as it stands: a blow against the direction of {to}")
     n = min(len(h.force) for h in good)
-    pulse: Array = np.array([[h.force[:n] for h in good]], float) * scales[0]
-    response: Array = np.array([[h.response[:, :n] for h in good]]) * np.array(scales[1:])[:, None]
+    pulse: Array = np.array([[h.force[:n] for h in good]], float)
+    response: Array = np.array([[h.response[:, :n] for h in good]])
     end = form.exponential_end or end_needed(response)
     decay = float(-np.log(end) / (n * step))
     band = (form.band_Hz[0], form.band_Hz[1]) if form.band_Hz else shared(excited(pulse, step), measured)
@@ -131,27 +131,30 @@ def _apart(files: Sequence[tuple[Path, Sequence[Motion]]], names: str) -> Questi
     ends = [[m.end for m in motions if not m.force] for _, motions in files]
     if any(of != ends[0] for of in ends):
         return Question(names, "test", 'other responses than the files of the same hammer point beside them: a test = "..." of their own')
+    quantities = [[told and told[0] for m in motions if not m.force for told in [units.of_response(m.unit)]] for _, motions in files]
+    if any(of != quantities[0] for of in quantities):
+        return Question(names, "columns", "responses of one quantity in all files of a hammer point; some are " + listed(sorted({q for of in quantities for q in of if q})))
     steps = {m.step for _, motions in files for m in motions}
     if max(steps) > min(steps) * (1 + 1e-6):
         return Question(names, "sample_rate_Hz", f"one sampling rate; its records have {listed(f'{1 / s:g} Hz' for s in sorted(steps))}")
     return None
 
 
-def _usable(files: Sequence[tuple[Path, Sequence[Motion]]], step: float, form: RecordForm) -> tuple[list[Hit], int, list[str]]:
-    """The hits of all files that can be used, of how many, and why others cannot."""
+def _usable(files: Sequence[tuple[Path, Sequence[Motion]]], scales: Sequence[Sequence[float]], step: float, form: RecordForm) -> tuple[list[Hit], int, list[str]]:
+    """The hits of all files that can be used, in SI by the `scales` of each file, of how many, and why others cannot."""
     ends = [m.end for m in files[0][1] if not m.force]
     good: list[Hit] = []
     notes: list[str] = []
     left_out: list[str] = []
     hits = 0
-    for path, motions in files:
+    for (path, motions), (force, *moved) in zip(files, scales, strict=True):
         own, said = hits_of(path, motions, step, form)
         hits += len(own)
         notes += said
         limits = limits_of(own)
         for hit in own:
             if (wrong := fault(hit, ends, step, form, limits)) is None:
-                good.append(hit)
+                good.append(replace(hit, force=force * hit.force, response=np.array(moved)[:, None] * hit.response))
             else:
                 left_out.append(f"{hit.where}: left out, {wrong}")
     return good, hits, notes + left_out
