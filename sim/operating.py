@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from itertools import pairwise
+from numbers import Real
 
 import mujoco
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
 from thermospindle.model import sense
 from thermospindle.model.bearing.pair import PairState, solve
 from thermospindle.model.bearing.pressure import pressures
 from thermospindle.model.built.imperfections import Imperfections
-from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.files.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor import mjcf
@@ -108,17 +111,30 @@ class OperatingPoint:
 
     def modes_below(self, highest: float) -> list[Mode]:
         """Oscillating modes below `highest` (Hz); of a flexible shaft quicker than all `modes`."""
+        if not isinstance(highest, Real) or not highest > 0:
+            raise BadInput(f"highest = {highest!r}: must be a positive number")
         return modes(self.chain, self.linear, highest) if "modes" not in self.__dict__ else [m for m in self.modes if m.frequency < highest]
 
-    def frf(self, frequency: Array, window_decay: float = 0.0, between: Between | None = None) -> ComplexArray:
+    def frf(self, frequency: ArrayLike, window_decay: float = 0.0, between: Between | None = None) -> ComplexArray:
         """Exact mobility (n_resp, n_ref, n) of the linear model at `frequency` (Hz), as the measuring chain shows it.
 
-        `window_decay` (1/s) is that of an exponential window that is known and still in the FRFs; with the mass `between` nodes of shafts (`mass_between`) where it is, as MuJoCo does not step it.
+        BadInput for frequencies that are no row of numbers, zero or more. `window_decay` (1/s) is that of an exponential window that is known and still in the FRFs; with the mass `between` nodes of shafts (`mass_between`) where it is, as MuJoCo does not step it.
         """
-        m = self.measurement
+        m, frequency = self.measurement, lines_of("frequency", frequency, zero=True)
         s: ComplexArray = np.asarray(frequency - 1j * (m.decay + window_decay) / (2 * np.pi), complex)
         value = frf(self.linear, m.response_rows, m.reference_rows, s, "mobility", between)
         return value * (m.gain[:, None] * np.exp(-2j * np.pi * frequency * m.delay[:, None]))[:, None, :]
+
+
+def lines_of(name: str, frequency: ArrayLike, zero: bool = False) -> Array:
+    """Frequencies (n,) in Hz of an argument called `name`; `BadInput` where they are no row of positive numbers, or `zero`."""
+    try:
+        lines = np.atleast_1d(np.asarray(frequency))
+    except (TypeError, ValueError):
+        lines = np.zeros(0)
+    if lines.dtype.kind not in "iuf" or lines.ndim != 1 or not lines.size or not np.all(np.isfinite(lines)) or np.any(lines < 0 if zero else lines <= 0):
+        raise BadInput(f"{name} = {reprlib.repr(frequency)}: must be one row of positive numbers{' or zero' * zero}")
+    return np.asarray(lines, float)
 
 
 def mass_between(point: OperatingPoint, drawing: Spindle) -> Between | None:

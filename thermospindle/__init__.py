@@ -7,7 +7,7 @@
     for mode in ts.modes(point):
         print(mode.kind, mode.frequency)
 
-The names below are functions of `thermospindle.front`, loaded when first used: importing this package costs nothing. They take and return
+The names below are functions of `thermospindle.front` and `thermospindle.verbs`, loaded when first used: importing this package costs nothing. They take and return
 the objects that the command line uses; `thermospindle.testing` has assertions for pytest.
 """
 
@@ -29,16 +29,32 @@ if TYPE_CHECKING:
     from thermospindle.front import point as point
     from thermospindle.front import read_log as read_log
     from thermospindle.model.errors import BadInput as BadInput
+    from thermospindle.model.errors import NoEquilibrium as NoEquilibrium
+    from thermospindle.verbs import check as check
+    from thermospindle.verbs import resonances as resonances
+    from thermospindle.verbs import runout as runout
+    from thermospindle.verbs import static as static
+    from thermospindle.verbs import table as table
+    from thermospindle.verbs import warmup as warmup
 
-__all__ = ["BadInput", "add", "answer", "campaign", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log"]
+MODULES = {
+    "front": ("add", "answer", "campaign", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log"),
+    "verbs": ("check", "resonances", "runout", "static", "table", "warmup"),
+    "model.errors": ("BadInput", "NoEquilibrium"),
+}
+__all__ = [
+    "BadInput", "NoEquilibrium", "add", "answer", "campaign", "check", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log",
+    "resonances", "runout", "static", "table", "warmup",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
+    module = next((module for module, names in MODULES.items() if name in names), None)
+    if module is None:
         raise AttributeError(f"module 'thermospindle' has no attribute {name!r}; there are {', '.join(__all__)}")
     from importlib import import_module
 
-    found = getattr(import_module("thermospindle.model.errors" if name == "BadInput" else "thermospindle.front"), name)
+    found = getattr(import_module(f"thermospindle.{module}"), name)
     globals()[name] = found
     return found
 

@@ -11,26 +11,24 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy loads
 
-import reprlib
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import isfinite
-from numbers import Real
+from importlib import import_module
 from operator import methodcaller
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from thermospindle.arguments import an, number, of_kind, several, whole
 from thermospindle.model.built.tolerance import LEAST, MOST, deviated
 from thermospindle.model.errors import BadInput, instead
 from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.elements import HAMMER
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load as load_scene
-from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.options import FASTEST, HITS, HOTTEST, NEWTONS
 from thermospindle.sim.campaign.beside import POWER
@@ -42,14 +40,17 @@ from thermospindle.sim.effects.own import installed
 from thermospindle.sim.hammer.test import ImpactTest, impact_tests
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.identification.modal import Modes, extract
-from thermospindle.sim.operating import OperatingPoint, doubts, operating_point
+from thermospindle.sim.operating import OperatingPoint, doubts, lines_of, operating_point
 from thermospindle.sim.run import identify
 from thermospindle.sim.study.variants import with_values
 
 if TYPE_CHECKING:
     from thermospindle.diagnosis.compare.compare import Comparison
     from thermospindle.diagnosis.verdict import Diagnosis
+    from thermospindle.model.files.stiffness_table import StiffnessTable
     from thermospindle.report.log.read import Log
+    from thermospindle.sim.resonance.found import ResonanceMap
+    from thermospindle.sim.warmup import Warmup
 
 __tracebackhide__ = methodcaller("errisinstance", BadInput)  # pytest shows where it was asked
 LINES = 2000  # of an FRF over the scene's band, where no frequencies are given
@@ -62,7 +63,7 @@ def load(scene: str | Path, effect_files: Sequence[str | Path] = (), *, values: 
     {"sets.main.preload_N": 200, "effects.bond_softening.hot_compliance": 10}, as in `[vary]` of a study.
     """
     of_kind("scene", scene, (str, Path), "a scene's folder or the name of a shipped one")
-    files = [Path(f) for f in _several("effect_files", effect_files, "paths of files")]
+    files = [Path(f) for f in several("effect_files", effect_files, "paths of files")]
     spindle, catalogue = equipped(load_scene(scene), files)
     if not values:
         return spindle
@@ -75,7 +76,7 @@ def point(spindle: Spindle | str | Path, temperature_C: float, *, speed_rpm: flo
 
     Raises `NoEquilibrium` where the bearings find no balance; warns (`UserWarning`) of a condition that no real spindle bears and of what is odd about its bearings.
     """
-    found = soaked(_spindle(spindle), temperature_C, speed_rpm)
+    found = soaked(drawing_of(spindle), temperature_C, speed_rpm)
     for doubt in odd(found):
         warnings.warn(doubt, stacklevel=2)
     return found
@@ -122,7 +123,7 @@ def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.i
         raise BadInput(f"source: no modes can be found in its FRFs: {error}") from None
 
 
-def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = None, *, quantity: str = "mobility") -> Frf:
+def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = None, *, quantity: Literal["receptance", "mobility", "accelerance"] = "mobility") -> Frf:
     """FRFs between the scene's measuring points: `frf["hub_top0", "hub_top90"]` is one of them, (n,) complex, SI.
 
     Of an operating point exact at `frequency_Hz` (n,), by default 2000 lines over the scene's band; of an impact test the H1 estimate with coherence
@@ -141,7 +142,7 @@ def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = No
         factor = (2j * np.pi * found.frequency) ** POWER[quantity]
         sd = None if found.sd is None or not np.all(np.isfinite(found.sd)) else found.sd * np.abs(factor)
         return replace(found, value=found.value * factor, sd=sd, quantity=quantity, names=names)
-    lines = np.linspace(*spindle.hammer.band, LINES) if frequency_Hz is None else _lines(frequency_Hz)
+    lines = np.linspace(*spindle.hammer.band, LINES) if frequency_Hz is None else lines_of("frequency_Hz", frequency_Hz)
     value = source.frf(lines) * (2j * np.pi * lines) ** POWER[quantity]
     return Frf(lines, value, tuple(names), spindle.hammer.hammer_nodes, quantity, names=names)
 
@@ -151,7 +152,7 @@ def impact(
     *,
     hits: int | None = None,
     level_N: float | None = None,
-    element: str = "linear",
+    element: Literal["linear", "ball-by-ball", "reduced"] = "linear",
     seed: int = 0,
     noise: bool = True,
 ) -> ImpactTest:
@@ -162,12 +163,12 @@ def impact(
     """
     of_kind("point", point, (OperatingPoint,), "an operating point (ts.point)")
     if hits is not None:
-        _whole("hits", hits, 1, HITS)
+        whole("hits", hits, 1, HITS)
     if level_N is not None:
         number("level_N", level_N, 0.0, NEWTONS)
     if element not in HAMMER:
         raise BadInput(f"element = {element!r}: {instead(str(element), HAMMER)}")
-    _whole("seed", seed, 0, 10**18 - 1)
+    whole("seed", seed, 0, 10**18 - 1)
     of_kind("noise", noise, (bool,), "True or False")
     changes = {key: value for key, value in (("hits", hits), ("level", level_N)) if value is not None}
     settings = replace(point.spindle.hammer, **changes)  # type: ignore[arg-type]
@@ -185,7 +186,7 @@ def compare(spindle: Spindle | str | Path, tests: Campaign | str | Path) -> Comp
     from thermospindle.diagnosis.compare.compare import compare as beside
     from thermospindle.diagnosis.runout.lines import modal_tests
 
-    return beside(_spindle(spindle), modal_tests(_campaign(tests)))
+    return beside(drawing_of(spindle), modal_tests(_campaign(tests)))
 
 
 def diagnose(
@@ -201,25 +202,30 @@ def diagnose(
     from thermospindle.diagnosis.runout.lines import modal_tests
     from thermospindle.diagnosis.verdict import diagnose as search
 
-    catalogue = CATALOGUE if effects is None else tuple(by_name(name) for name in _several("effects", effects, "names"))
-    return search(_spindle(spindle), modal_tests(_campaign(tests)), catalogue, progress)
+    catalogue = CATALOGUE if effects is None else tuple(by_name(name) for name in several("effects", effects, "names"))
+    return search(drawing_of(spindle), modal_tests(_campaign(tests)), catalogue, progress)
 
 
-def answer(found: Diagnosis | Comparison) -> dict[str, Any]:
-    """All that the command line tells of a diagnosis or a comparison with `--json`, as plain dicts, lists and numbers with units in their keys: of a diagnosis `verdict`, `effects`,
-    `probability`, and `candidates` with the sizes that each effect has, in every test too, and their standard errors. docs/site/answers.toml, and the site, say what every key holds.
+def answer(found: Diagnosis | Comparison | StiffnessTable | Warmup | ResonanceMap) -> dict[str, Any]:
+    """All that the command line tells with `--json`, as plain dicts, lists and numbers with units in their keys: of a diagnosis `verdict`, `effects`,
+    `probability`, and `candidates` with the sizes that each effect has, in every test too, and their standard errors; of a comparison, a table, a warm-up and a map likewise.
+    docs/site/answers.toml, and the site, say what every key holds.
     """
-    from thermospindle.diagnosis.compare.compare import Comparison as Beside
-    from thermospindle.diagnosis.verdict import Diagnosis as Found
+    for module, kind, told, function in ANSWERED:
+        if isinstance(found, getattr(import_module(f"thermospindle.{module}"), kind)):
+            return cast(dict[str, Any], getattr(import_module(f"thermospindle.report.text.{told}"), function)(found))
+    names = "a diagnosis (ts.diagnose), a comparison (ts.compare), a table (ts.table), a warm-up (ts.warmup) or a map (ts.resonances)"
+    raise BadInput(f"found: must be {names}, not {an(found)}")
 
-    of_kind("found", found, (Found, Beside), "a diagnosis (ts.diagnose) or a comparison (ts.compare)")
-    if isinstance(found, Beside):
-        from thermospindle.report.text.compare import comparison_json
 
-        return comparison_json(found)
-    from thermospindle.report.text.diagnosis.answer import diagnosis_json
-
-    return diagnosis_json(found)
+ANSWERED = (
+    ("diagnosis.compare.compare", "Comparison", "compare", "comparison_json"),
+    ("diagnosis.verdict", "Diagnosis", "diagnosis.answer", "diagnosis_json"),
+    ("model.files.stiffness_table", "StiffnessTable", "states", "table_json"),
+    ("sim.warmup", "Warmup", "warmup", "warmup_json"),
+    ("sim.resonance.found", "ResonanceMap", "resonance", "map_json"),
+)
+"""What `answer` tells: module and class of what was found, module and function that tell it; loaded when asked for."""
 
 
 def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> Spindle:
@@ -228,7 +234,7 @@ def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> S
 
     Nothing is written; `spindle add` writes a scene.
     """
-    drawing = _spindle(spindle)
+    drawing = drawing_of(spindle)
     of_kind("effect", effect, (str, Path), "the name of an effect, or the path of a file of your own")
     found = fitted_to(of_file(effect, drawing) if isinstance(effect, Path) else by_name(effect, (*CATALOGUE, *installed())), drawing)
     if why := refusal(found, drawing):
@@ -250,7 +256,7 @@ def deviate(spindle: Spindle | str | Path, deviations: Mapping[str, float]) -> S
     for name, value in deviations.items():
         if not LEAST <= number(name, value) <= MOST:
             raise BadInput(f"{name} = {value:g}: must be a relative deviation from {LEAST:g} to {MOST:g}")
-    return deviated(_spindle(spindle), deviations)
+    return deviated(drawing_of(spindle), deviations)
 
 
 def read_log(file: str | Path) -> Log:
@@ -261,31 +267,8 @@ def read_log(file: str | Path) -> Log:
     return read(Path(file))
 
 
-def of_kind(name: str, value: object, kinds: tuple[type, ...], told: str) -> None:
-    """`BadInput` for an argument of another kind than it is told to be."""
-    if not isinstance(value, kinds):
-        of = type(value).__name__
-        raise BadInput(f"{name}: must be {told}, not {'None' if value is None else f'an {of}' if of[0].lower() in 'aeio' else f'a {of}'}")
-
-
-def _several(name: str, value: Sequence[Any], told: str) -> Sequence[Any]:
-    if isinstance(value, str | Path):
-        raise BadInput(f"{name} = {value!r}: must be a list of {told}, as [{value!r}]")
-    of_kind(name, value, (Sequence,), f"a list of {told}")
-    return value
-
-
-def _lines(frequency_Hz: ArrayLike) -> Array:
-    try:
-        lines = np.atleast_1d(np.asarray(frequency_Hz))
-    except (TypeError, ValueError):
-        lines = np.zeros(0)
-    if lines.dtype.kind not in "iuf" or lines.ndim != 1 or not lines.size or not np.all(np.isfinite(lines)) or np.any(lines <= 0):
-        raise BadInput(f"frequency_Hz = {reprlib.repr(frequency_Hz)}: must be one row of positive numbers")
-    return np.asarray(lines, float)
-
-
-def _spindle(spindle: Spindle | str | Path) -> Spindle:
+def drawing_of(spindle: Spindle | str | Path) -> Spindle:
+    """A spindle, or that of a scene named."""
     of_kind("spindle", spindle, (Spindle, str, Path), "a spindle (ts.load), a scene's folder or the name of a shipped one")
     return spindle if isinstance(spindle, Spindle) else load(spindle)
 
@@ -293,16 +276,3 @@ def _spindle(spindle: Spindle | str | Path) -> Spindle:
 def _campaign(tests: Campaign | str | Path) -> Campaign:
     of_kind("tests", tests, (Campaign, str, Path), "a campaign (ts.campaign) or its folder")
     return tests if isinstance(tests, Campaign) else campaign(tests)
-
-
-def number(name: str, value: float, above: float = -np.inf, most: float = np.inf) -> float:
-    """The number that an argument is, above `above` and up to `most`; `BadInput` for any other."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value) or not above < value <= most:
-        bounds = [f"above {above:g}"] * bool(isfinite(above)) + [f"up to {most:g}"] * bool(isfinite(most))
-        raise BadInput(f"{name} = {value!r}: must be a finite number {' and '.join(bounds)}".rstrip())
-    return float(value)
-
-
-def _whole(name: str, value: int, least: int, most: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise BadInput(f"{name} = {value!r}: must be a whole number from {least} to {most}")

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from thermospindle.failing import at_speed, behind, called, energy, named, odd, table
 
@@ -45,7 +45,7 @@ UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s2)/N"}
 def _asked(positive: Sequence[str] = (), **numbers: float) -> None:
     """`BadInput` for a number that an assertion cannot be asked with; those named in `positive` are above nothing."""
     __tracebackhide__ = True
-    from thermospindle.front import number
+    from thermospindle.arguments import number
 
     for name, value in numbers.items():
         number(name, value, 0.0 if name in positive else -float("inf"))
@@ -106,7 +106,7 @@ def assert_damping(scene: Scene, *, mode: str | int, at_C: float, percent: float
 
 def assert_peak_level(
     scene: Scene, *, mode: str | int, at_C: float, response: str | int, reference: str | int, level: float, within: float,
-    quantity: str = "mobility", speed_rpm: float = 0.0,
+    quantity: Literal["receptance", "mobility", "accelerance"] = "mobility", speed_rpm: float = 0.0,
 ) -> None:  # fmt: skip
     """`|H|` between two points at the mode's damped frequency is `level` (SI of `quantity`), give or take `within`."""
     __tracebackhide__ = True
@@ -206,7 +206,7 @@ def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) ->
 
 def _loaded(scene: Scene) -> Spindle:
     __tracebackhide__ = True
-    from thermospindle.front import of_kind
+    from thermospindle.arguments import of_kind
     from thermospindle.model.machine import Spindle
     from thermospindle.model.scene.reading import scene_path
 
@@ -232,7 +232,8 @@ _POINTS: dict[tuple[str, float, float], OperatingPoint] = {}
 def _point(spindle: Spindle, temperature: float, speed: float) -> OperatingPoint:
     __tracebackhide__ = True
     from thermospindle import front
-    from thermospindle.front import number, soaked
+    from thermospindle.arguments import number
+    from thermospindle.front import soaked
     from thermospindle.model.scene.reading import content_hash
 
     key = content_hash(spindle), number("temperature_C", temperature), number("speed_rpm", speed)

@@ -63,6 +63,7 @@ PRESSURE = "contact_pressure_MPa"
 FURTHER = (*OF_BALLS, *OF_ROLLERS, *BY_DIRECTION, PRESSURE, *BETWEEN)
 GAPS = "{}: the table has gaps; every bearing needs a row for each temperature and speed, and one only"
 MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
+STEPS = 5  # of temperature over a scene's range, where none are told
 
 
 @dataclass(frozen=True, eq=False)

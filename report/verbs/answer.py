@@ -12,13 +12,12 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.stiffness_table import STEPS
 from thermospindle.model.machine import FAINTEST, Spindle
 from thermospindle.model.rotor.elements import BALLS, LINEAR
 from thermospindle.report.folder import check_folder, mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.known import equipped
-
-STEPS = 5  # of temperature over a scene's range, unless a verb is given others
 
 
 @dataclass(frozen=True)

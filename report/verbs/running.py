@@ -29,13 +29,12 @@ from thermospindle.report.verbs.answer import (
 )
 from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
-from thermospindle.sim.resonance.map import fastest, resonance_map, stages
+from thermospindle.sim.resonance.map import SPEEDS, TEMPERATURES, fastest, resonance_map, stages
 from thermospindle.sim.running.run import record_steps
 from thermospindle.sim.running.runout import planned, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
 from thermospindle.sim.warmup import SHORTEST, STAGES, Warmup, warm_up
 
-STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
 LONG = 500_000  # steps of a simulated record, from which it takes more than half a minute of a flexible shaft
 
 
@@ -141,8 +140,8 @@ def resonances(
     spindle, _ = with_effects(scene, effect_files)
     speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
     nominal = Condition(temperature_or_reference(temperature, spindle), speed)
-    grid = temperatures_or_range(temperatures, spindle, STEPS_OF_TEMPERATURE)
-    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, fastest(spindle, speed), STEPS_OF_SPEED).tolist()
+    grid = temperatures_or_range(temperatures, spindle, TEMPERATURES)
+    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, fastest(spindle, speed), SPEEDS).tolist()
     with progress_bar(stages(spindle, len(grid))) as progress:
         found = resonance_map(spindle, grid, speeds, nominal, multiples, progress=progress, nearby=bool(speeds_rpm))
     conditions = [nominal, *(Condition(t, s) for t in grid for s in speeds)]

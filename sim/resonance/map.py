@@ -30,6 +30,7 @@ from thermospindle.sim.resonance.between import passes_zero
 from thermospindle.sim.resonance.found import Coincidence, Curve, ResonanceMap, once, strongest
 from thermospindle.sim.resonance.grid import PARTS, Candidate, Grid, same_direction
 
+TEMPERATURES, SPEEDS = 21, 41  # of a map, where none are told
 MULTIPLES = 3  # of the number of balls, and even ball orders, whose lines are drawn
 DENSER = 18  # coincidences about which runout is computed at more places, as many as a report lists
 
