@@ -152,13 +152,16 @@ def _tolerances(answer: dict[str, Any]) -> str:
 def _detectable(answer: dict[str, Any]) -> str:
     rows = [
         [
-            escape(name), escape(row["parameter"]), f"{row['size']:.2g}", unit_cell(row["unit"]),
+            escape(name), escape(row["parameter"]), f"{row['size']:.2g}", unit_cell(row["unit"]), escape(row["acting_words"]),
             "not visible at a typical size" if name in answer["invisible"] else "",
         ]
         for name, row in sorted(answer["detectable_in"].items())
     ]  # fmt: skip
-    caption = "Size from which each effect would have been separated from the tolerances, which are fitted anew beside it; its own lines are worked out at that size."
-    return table(["effect", "parameter", "smallest", "unit", ""], rows, (0, 1, 3, 4), caption)
+    caption = (
+        "Size from which each effect would have been separated from the tolerances, which are fitted anew beside it; its own lines are worked out at that size. "
+        "It is that of an effect acting where and when it shows most; acting otherwise, as a preload lost before all tests, it may do what tolerances do."
+    )
+    return table(["effect", "parameter", "smallest", "unit", "acting", ""], rows, (0, 1, 3, 4, 5), caption)
 
 
 def _evidence(value: float) -> str:

@@ -16,7 +16,7 @@ from thermospindle.diagnosis.inference.evidence import Evidence, left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
-from thermospindle.diagnosis.parameters.mechanism import one_size
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, one_size
 from thermospindle.diagnosis.parameters.nuisance import Nuisance
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Spindle
@@ -51,7 +51,10 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "may_hide": list(d.may_hide),
         "invisible": _invisible(d),
         "detectable": {name: size for name, (_, size) in d.detectable.items()},
-        "detectable_in": {name: {"parameter": m.size.name, "unit": m.size.unit, "size": size} for name, (m, size) in d.detectable.items()},
+        "detectable_in": {
+            name: {"parameter": m.size.name, "unit": m.size.unit, "size": size, "acting": _acting(m), "acting_words": _acting_words(m, d.spindle)}
+            for name, (m, size) in d.detectable.items()
+        },
         "error": {"drawn": drawn, "before": before, "after": after}
         | {key: known(getattr(v, key)) for key in ("held_out_before", "held_out_after", "held_out_gain")},
         "reference_temperature_C": d.spindle.reference_temperature,
@@ -111,6 +114,17 @@ def _learned(evidence: Evidence) -> dict[str, float]:
         "thermal_motions_times": s.sizes.get(kinds_of.EXPANSION, 1.0),
         "errors_times": s.errors,
     }
+
+
+def _acting(m: Mechanism) -> dict[str, float]:
+    """The other parameters of a mechanism: as chosen, and shapes where they are neutral."""
+    return {**{q.name: q.neutral for q in m.shape}, **m.choices}
+
+
+def _acting_words(m: Mechanism, spindle: Spindle) -> str:
+    """Of these the ones that say where and when it acts: its choices, and shares between two ideal cases."""
+    told = {q.name: q for q in m.effect.parameters if q.choices or q.limits == (0.0, 1.0)}
+    return ", ".join(f"{name} {called(told[name], value, spindle) or f'{value:g}'}" for name, value in _acting(m).items() if name in told)
 
 
 def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:

@@ -206,9 +206,10 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
         )
     if answer["verdict"] == "none":
         small = sorted(answer["detectable_in"].items())
-        console.print("\nSmallest size these data would have shown:")
+        console.print("\nSmallest size these data would have shown, of each effect acting where and when it shows most:")
         for name, row in small:
-            console.print(f"  {name}: {row['parameter']} {row['size']:.2g}{unit_word(row['unit'], ' ')}")
+            acting = f" ({row['acting_words']})" if row["acting_words"] else ""
+            console.print(f"  {name}: {row['parameter']} {row['size']:.2g}{unit_word(row['unit'], ' ')}{acting}")
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
 
 
