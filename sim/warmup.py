@@ -146,7 +146,9 @@ def warm_up(
             end = duration or whole
             return heat.march(model, drive, start, end, tolerance, whole / STEPS, lambda share: passed(share, end))
         except (OutsideRange, heat.NotSettled) as error:
-            raise type(error)(f"{where} {_ran_away(machine, reached, str(error))}") from None
+            shorter = 0.9 * reached[-1].time / MINUTE
+            until = f"; the way there is computed all the same: --minutes {shorter:.2g}" if shorter * MINUTE > SHORTEST else ""
+            raise type(error)(f"{where} {_ran_away(machine, reached, str(error))}{until}") from None
 
     where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
 

@@ -44,6 +44,7 @@ def say(*arguments: object) -> None:
 
 QUICK: dict[str, tuple[list[object], list[str]]] = {
     "table": (["table", SCENE, "--temperatures", 20], ["table"]),
+    "table of several speeds": (["table", SCENE, "--temperatures", 20, "--speeds", 0, 7200], ["table", "table, and with several speeds"]),
     "modes": (["modes", SCENE], ["modes"]),
     "static": (["static", SCENE], ["static"]),
     "check": (["check", SCENE], ["check"]),

@@ -55,7 +55,8 @@ def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.
     shapes = shapes / shapes[np.argmax(np.abs(shapes), axis=0), np.arange(len(value))]
     every = np.concatenate([element_rows(chain, e) for e in chain.elements]) @ shapes
     strain = np.array([_quadratic(part, e.stiffness) for part, e in zip(every.reshape(len(chain.elements), 5, len(value)), chain.elements, strict=True)])
-    strain = strain / strain.sum(axis=0)
+    whole = strain.sum(axis=0)
+    strain = strain / np.where(whole > 0, whole, 1.0)  # none of a part that hangs free, but for rounding
     names = [e.name for e in chain.elements]
     kind = kinds(linear, shapes)
     return [

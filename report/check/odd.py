@@ -54,6 +54,8 @@ SLOW = 2.0
 """Hz, of a machine as a whole that stands on rubber feet: 3 to 10."""
 FAR = 3.0
 """Radii of gyration from a centre of mass beyond which a body given by its mass is taken to have ended: a rod ends at 1.7."""
+MOVES_FREE = 1e-6
+"""Of the largest of a free motion, from which a part takes part in it."""
 MANY_STEPS = 1e6
 """Of integration in a virtual hammer test, some minutes of computing for a flexible shaft."""
 
@@ -143,10 +145,16 @@ def _massless(found: Looked) -> Iterator[str]:
 
 
 def _free(found: Looked) -> Iterator[str]:
-    count = free_motions(found.reference.linear.stiffness).shape[1]
-    if count:
+    free = free_motions(found.reference.linear.stiffness)
+    if count := free.shape[1]:
         what = "a motion" if count == 1 else f"{count} motions"
-        yield f"nothing holds the spindle against {what}, as of a shaft that hangs free or floats along its axis"
+        bodies = [body for body, _ in found.reference.linear.dofs]
+        moving = {body for body, row in zip(bodies, np.abs(free).max(axis=1), strict=True) if row > MOVES_FREE}
+        alone = [b.name for b in found.spindle.structure.rigid_bodies if b.name in moving]
+        if moving and moving == set(alone) and moving != set(bodies):
+            yield f"nothing holds {listed([repr(name) for name in alone])} against {what}: a body without a joint; structure.joints may tie it to another"
+        else:
+            yield f"nothing holds the spindle against {what}, as of a shaft that hangs free or floats along its axis"
 
 
 def _lost(found: Looked) -> Iterator[str]:

@@ -21,6 +21,8 @@ from thermospindle.sim.warmup import Moment, Warmup, clearance, energy, loose_ro
 LINES = 16  # of the terminal table
 NEAR = 0.5
 """Of a load that is added, what may come back by heat before a warm-up speaks of it."""
+STIFFNESSES = (("radial", "radial_stiffness", "N_per_m"), ("axial", "axial_stiffness", "N_per_m"), ("tilt", "tilt_stiffness", "N_m_per_rad"))
+"""Of ball rows: name, attribute of their state, unit."""
 ROLLER_COLUMNS = (("temperature", "C"), ("clearance", "um"), ("radial stiffness", "N_per_m"), ("friction", "W"))
 """Of the CSV, in the order of `rollers`."""
 
@@ -48,6 +50,7 @@ def warmup_json(warmup: Warmup) -> dict[str, Any]:
                 "preload_N": [m.preload[b.name] for m in moments],
                 "contact_angle_deg": [float(np.degrees(m.point.state.bearing(b.name).contact_angle)) for m in moments],
                 "friction_W": [m.friction[b.name] for m in moments],
+                **{f"{key}_{unit}": [getattr(m.point.state.bearing(b.name), key) for m in moments] for _, key, unit in STIFFNESSES},
             }
             for b in warmup.spindle.bearings
         }
@@ -91,7 +94,11 @@ def rows(warmup: Warmup) -> tuple[list[str], list[list[float]]]:
     header += [f"mode {k} {m.kind}_Hz" for k, m in enumerate(warmup.modes, 1)]
     of_rollers = {b: rollers(warmup, b) for b in roller_names(warmup)}
     header += [f"{name} of {b} bearing_{unit}" for b in of_rollers for name, unit in ROLLER_COLUMNS]
-    further = np.array([series for own in of_rollers.values() for series in own.values()]).T.tolist() or [[]] * len(warmup.times)
+    columns = [series for own in of_rollers.values() for series in own.values()]
+    for name, key, unit in STIFFNESSES:
+        header += [f"{name} stiffness of {b} bearing_{unit}" for b in bearings]
+        columns += [[getattr(m.point.state.bearing(b), key) for m in warmup.moments] for b in bearings]
+    further = np.array(columns).T.tolist() or [[]] * len(warmup.times)
     body = []
     for time, moment, frequency, more in zip(warmup.times, warmup.moments, warmup.frequencies, further, strict=True):
         row = [float(time), *(moment.temperatures[g] for g in regions)]

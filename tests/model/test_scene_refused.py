@@ -199,6 +199,7 @@ def test_a_body_named_like_a_shaft_is_refused():
     ("change", "said"),
     [
         ({"pitch_diameter_mm": 200.0}, "bearings.front1: pitch_diameter_mm = 200: the roller centres must lie between the raceways at r_mm = 41 and 50"),
+        ({"rows": 2, "row_spacing_mm": 60.0}, "bearings.front1: row_spacing_mm = 60: the middles of its 2 rows at z_mm = "),
         ({"roller_diameter_mm": 9.6}, "leave 9 mm for rollers of roller_diameter_mm = 9.6"),
     ],
 )
