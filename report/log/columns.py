@@ -29,6 +29,17 @@ VIEWER_LIGHT, LIGHT = np.arctan2(2.0, 1.0), np.deg2rad(-60.0)
 """Azimuths from which Rerun's light comes, along (1, 2, 3) in its shaders, and from which bodies are lit."""
 
 
+UNITS = {
+    "run": {"/numbers/peaks:temperature": "C", "/numbers/peaks:frequency": "Hz", "/numbers/peaks:frequency_sd": "Hz", "/records:force": "N", "/records:velocity": "m/s"},
+    "runout": {
+        "/signals": "nm", "/numbers/quoted": "m", "/numbers/lines:frequency": "Hz", "/numbers/lines:amplitude": "m", "/numbers/lines:forward": "m", "/numbers/lines:backward": "m",
+        "/numbers/waterfall:frequency": "Hz", "/numbers/waterfall:natural": "Hz", "/numbers/waterfall:radial": "m", "/numbers/waterfall:axial": "m",
+    },
+    "warmup": {"/series/regions": "C", "/series/bearings/temperature": "C", "/series/bearings/preload": "N", "/series/bearings/contact angle": "deg", "/series/modes": "Hz of change since the start"},
+}  # fmt: skip
+"""By kind of log the units of numbers whose names have none, by entity, or entity and component; of an FRF it is that of its `quantity`. Every log holds its own, at `numbers/units`."""
+
+
 @contextmanager
 def whole_log(path: Path, kind: str, name: str, about: Mapping[str, Any], blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
     """A recording into the file `path`, whole or not at all; its property `kind` says what it is `about` (`report.log.read.KINDS`).
@@ -48,6 +59,8 @@ def whole_log(path: Path, kind: str, name: str, about: Mapping[str, Any], bluepr
                 recording.save(file, default_blueprint=blueprint)
                 recording.send_recording_name(name)
                 recording.send_property(kind, rr.AnyValues(**about))
+                if units := UNITS.get(kind):
+                    log_values(recording, "numbers/units", {"of": list(units), "unit": list(units.values())})
                 yield recording
             finally:
                 recording.disconnect()

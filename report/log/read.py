@@ -84,6 +84,12 @@ class Log:
         """What the log says of itself: title, scene, condition, versions."""
         return {name: values[0] for name, values in self.table(f"/__properties/{self.kind}").items()}
 
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """Units of numbers whose names have none, by entity or entity:component; nothing in logs that were written before there were any."""
+        table = self.table("/numbers/units")
+        return dict(zip(table.get("of", ()), table.get("unit", ()), strict=True))
+
     @property
     def scene(self) -> str:
         return str(self.about["scene"])
