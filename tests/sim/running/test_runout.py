@@ -16,7 +16,6 @@ from tests.mounting import turning_inside
 from tests.report.parsed_page import Page
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import row_kinematics
-from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
@@ -36,11 +35,6 @@ SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"
 
 
 # ---------------------------------------------------------------- whole records
-
-
-@pytest.fixture(scope="module")
-def imperfect(spindle):
-    return with_imperfections(spindle, drawn(spindle, 3))
 
 
 @pytest.fixture(scope="module")
