@@ -23,7 +23,8 @@ def energy(springs, motion):
 
 
 def test_tangent_of_three_balls_that_share_no_symmetry():
-    """Around a whole row what a ball adds between tilts about x and y cancels: three balls on one side show it. Tension of 0.4 mm on 0.5 mm, so that it counts."""
+    """Around a whole row what a ball adds between tilts about x and y cancels: three balls on one side show it. They are
+    stretched far enough for their tension to count."""
     random = np.random.default_rng(1)
     angle = np.array([0.3, 0.9, 1.7])
     circle = np.stack([4e-3 * np.cos(angle), 4e-3 * np.sin(angle), np.zeros(3)], axis=1)

@@ -144,8 +144,8 @@ def test_strain_is_the_integral_of_the_law(spindle):
 
 @pytest.mark.slow
 def test_modulus_is_taken_at_the_temperature(spindle):
-    """A law that makes aluminium as soft at 60 C as another constant gives that constant's motions, within the reduced basis (`thermal.reduced`) at this tolerance of 1e-3. Outside its range a law
-    refuses."""
+    """A law that makes aluminium as soft at 60 C as another constant gives that constant's motions, within the reduced basis (`thermal.reduced`) at
+    this tolerance of 1e-3. Outside its range a law refuses."""
     aluminium = spindle.materials["aluminium"]
 
     def with_modulus(modulus):

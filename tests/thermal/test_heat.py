@@ -206,7 +206,8 @@ def test_slowest_decay_of_two_lumps(spindle):
 
 @pytest.mark.parametrize("back", [0.5, 0.97])
 def test_loads_that_nearly_run_away_settle_at_the_sum_of_their_series(spindle, back):
-    """A load of 10 N grows with the heat it makes; of what is added the share `back` returns: 10 N / (1 - back). Of 97 % plain repetition leaves 0.2 % after all its rounds."""
+    """A load of 10 N grows with the heat it makes; of what is added the share `back` returns: 10 N / (1 - back). Of 97 % plain
+    repetition leaves 0.2 % after all its rounds."""
     omega = 100.0
     model = lubricated(two_rings(spindle, 0.25), f0=0.0, f1=0.01)
     (b,), (weight,) = model.spindle.bearings, model.bearing

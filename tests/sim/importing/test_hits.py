@@ -58,8 +58,8 @@ def test_hits_that_are_not_of_one_length_are_asked_about_where_the_form_can_be_a
 
 
 def test_estimators_of_noisy_records():
-    """H1, H2 and Hv as Bendat & Piersol and Rocklin define them, of a response with so much noise that they differ by the coherence and its root. The force ends with its pulse, so that
-    its window cuts nothing off."""
+    """H1, H2 and Hv as Bendat & Piersol and Rocklin define them, of a response with so much noise that they differ by the coherence and its root. The
+    force ends with its pulse, so that its window cuts nothing off."""
     random, n, hits, start = np.random.default_rng(2), 4096, 12, 200
     force = np.zeros((hits, n))
     force[:, start : start + 3] = random.uniform(50, 90, (hits, 1)) * [0.6, 1.0, 0.6]
@@ -81,7 +81,8 @@ def test_estimators_of_noisy_records():
 
 
 def test_drift_and_offset_are_taken_out_of_a_response():
-    """An acceleration that is a straight line is drift alone, to half a sample of it; of a velocity what stood before the blow is taken out, and the change stays."""
+    """An acceleration that is a straight line is drift alone, to half a sample of it; of a velocity what stood before the blow is taken out, and the
+    change stays."""
     lead, before, n = 16, 80, 900
     ramp = 3.0 + 0.5 * np.arange(before - lead + n)
     asked = ramp[None, before - lead :], ramp[None, :before], lead
