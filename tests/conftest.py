@@ -51,6 +51,14 @@ def stiffly_mounted(spindle) -> Spindle:
 
 
 @pytest.fixture(scope="session")
+def imperfect(spindle) -> Spindle:
+    """With imperfections drawn from seed 3."""
+    from thermospindle.model.built.drawn import drawn
+
+    return replace(spindle, imperfections=drawn(spindle, 3))
+
+
+@pytest.fixture(scope="session")
 def cold(spindle):
     """Both bearings at the reference temperature, at rest."""
     from thermospindle.model.bearing.pair import solve

@@ -1,4 +1,4 @@
-"""Spindles of the tests mounted otherwise: another preload told at the reference, a spring behind a ring, the other ring turning."""
+"""Spindles of the tests mounted otherwise: another preload told at the reference, a spring behind a ring, the other ring turning, a hub with gears."""
 
 from __future__ import annotations
 
@@ -25,3 +25,9 @@ def turning_inside(spindle: Spindle, turns: str = "shaft") -> Spindle:
     bodies = tuple(replace(b, turns=b.name == turns) for b in spindle.structure.bodies)
     bearings = tuple(replace(b, turning_ring="inner") for b in spindle.bearings)
     return replace(spindle, bearings=bearings, structure=replace(spindle.structure, bodies=bodies))
+
+
+def geared(spindle: Spindle, ratio: float) -> Spindle:
+    """The same whose hub turns `ratio` times as fast as it says it does."""
+    bodies = tuple(replace(b, speed_ratio=ratio) if b.turns else b for b in spindle.structure.bodies)
+    return replace(spindle, structure=replace(spindle.structure, bodies=bodies))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENE
-from tests.sim.running.test_seen_part import geared
+from tests.mounting import geared
 from thermospindle.diagnosis.runout.compare import compare_runout
 from thermospindle.diagnosis.runout.explanation import variants
 from thermospindle.diagnosis.runout.fit import families, fit_family, merged
@@ -14,7 +14,6 @@ from thermospindle.diagnosis.runout.lines import look
 from thermospindle.diagnosis.runout.sources import sources
 from thermospindle.diagnosis.runout.verdict import _fitted, diagnose_runout
 from thermospindle.model.bearing.kinematics import lines, row_kinematics
-from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition
@@ -29,15 +28,9 @@ SPEED = 7200 * RPM
 
 
 @pytest.fixture(scope="module")
-def plain():
-    spindle = load(SCENE)
-    return replace(spindle, imperfections=drawn(spindle, 3))
-
-
-@pytest.fixture(scope="module")
-def made(plain):
+def made(imperfect):
     """What the hub shows at `SPEED`, whatever turns it."""
-    return runout_campaign(plain, [Condition(40.0, SPEED)], 0.5, path="linear")
+    return runout_campaign(imperfect, [Condition(40.0, SPEED)], 0.5, path="linear")
 
 
 def at_ratio(campaign, ratio):
@@ -45,21 +38,21 @@ def at_ratio(campaign, ratio):
 
 
 @pytest.mark.parametrize("ratio", [0.5, 2.0, -0.5])
-def test_a_geared_hub_has_the_lines_of_one_without_gears(plain, ratio):
+def test_a_geared_hub_has_the_lines_of_one_without_gears(imperfect, ratio):
     """Bearings and unbalance both turn with the hub: the unbalance has the ratio once, not twice."""
 
     def of(spindle, speed):
         point = operating_point(spindle, Condition(40.0, speed))
         return {(x.bearing, x.cause, x.order, x.name, x.direction): x.frequency for x in lines(spindle, row_kinematics(spindle, point.state), speed)}
 
-    direct, turned = of(plain, SPEED), of(geared(plain, ratio), SPEED / ratio)
+    direct, turned = of(imperfect, SPEED), of(geared(imperfect, ratio), SPEED / ratio)
     assert turned == pytest.approx(direct)
     assert direct["", "unbalance", 0, "1x", "radial"] == pytest.approx(120.0)
 
 
 @pytest.mark.parametrize("ratio", [0.5, 2.0])
-def test_a_geared_hub_compares_as_one_without_gears(plain, made, ratio):
-    [direct], [found] = compare_runout(plain, made), compare_runout(geared(plain, ratio), at_ratio(made, ratio))
+def test_a_geared_hub_compares_as_one_without_gears(imperfect, made, ratio):
+    [direct], [found] = compare_runout(imperfect, made), compare_runout(geared(imperfect, ratio), at_ratio(made, ratio))
     assert [(g.frequency, g.node) for g in found.lines] == [(pytest.approx(g.frequency), g.node) for g in direct.lines]
     assert [g.computed for g in found.lines] == pytest.approx([g.computed for g in direct.lines], rel=1e-6, abs=1e-15)
     for part in ("rro", "nrro"):
@@ -67,22 +60,22 @@ def test_a_geared_hub_compares_as_one_without_gears(plain, made, ratio):
         assert rows == pytest.approx(expected, rel=1e-6, abs=1e-14)
 
 
-def test_a_spectrum_parts_what_repeats_by_what_is_seen(plain, made):
+def test_a_spectrum_parts_what_repeats_by_what_is_seen(imperfect, made):
     """The once-per-revolution line of a hub at half the speed of the spindle is at half an order of it, and repeats."""
     [test] = made.tests
     record = test.runout
     bins = replace(record, kind="spectrum", axis=np.fft.rfftfreq(record.value.shape[1], record.step), value=np.fft.rfft(record.value) * 2 / record.value.shape[1])
     spectra = replace(made, tests=(replace(test, runout=bins),))
-    [direct], [found] = compare_runout(plain, spectra), compare_runout(geared(plain, 0.5), at_ratio(spectra, 0.5))
+    [direct], [found] = compare_runout(imperfect, spectra), compare_runout(geared(imperfect, 0.5), at_ratio(spectra, 0.5))
     assert direct.rro[0].computed_rms > 1e-10
     for part in ("rro", "nrro"):
         rows, expected = (np.array([(p.measured_rms, p.computed_rms) for p in getattr(x, part)]) for x in (found, direct))
         assert rows == pytest.approx(expected, rel=1e-6, abs=1e-14)
 
 
-def test_a_record_of_few_revolutions_of_what_is_seen_is_refused(plain, made):
+def test_a_record_of_few_revolutions_of_what_is_seen_is_refused(imperfect, made):
     with pytest.raises(BadInput, match=r"tests\.T40_n7200: runout: 3 revolutions of what node 8 sees, at 360 rpm; at least 4 whole ones are needed"):
-        compare_runout(geared(plain, 0.05), made)
+        compare_runout(geared(imperfect, 0.05), made)
 
 
 def test_only_the_unbalance_is_looked_for_where_bearings_are_numbers():

@@ -15,7 +15,7 @@ from tests.conftest import ROOT
 from tests.report.checked import SCENES, checked
 from thermospindle.cli import main
 from thermospindle.model.machine import Condition
-from thermospindle.model.rotor.chain import motion_rows
+from thermospindle.model.rotor.chain import matrices, motion_rows
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.check.looked import looked
@@ -206,6 +206,12 @@ def test_unbalance_is_told_to_drive_what_whirls_with_the_rotor(tmp_path: Path, c
     pair = [m for m in point.modes if abs(m.frequency / 120.0 - 1) < 0.05]
     assert [m.whirl for m in pair] == ["backward", "forward"]
     [told] = critical_words(text, tmp_path, capsys)
+    m, omega = matrices(point.chain), 2 * np.pi * pair[1].frequency
+    force = 5e-6 * (7200 * RPM) ** 2 * motion_rows(point.chain, "disc", (0.0, 0.0, 0.225))[:2].T @ [1, -1j]  # 5 g mm, whirling forward
+    moved = np.linalg.solve(m.stiffness + 1j * omega * m.damping - omega**2 * m.mass, force)
+    micrometres = re.search(r"5 g mm of the scene at z = 225 mm would move that place by ([\d.]+) um in resonance", told)
+    assert micrometres is not None
+    assert float(micrometres[1]) == pytest.approx(1e6 * abs(motion_rows(point.chain, "disc", (0.0, 0.0, 0.225))[0] @ moved), rel=0.01)
     assert told.startswith(f"a natural frequency of {pair[1].frequency:.0f} Hz lies at the nominal speed of 7200 rpm and whirls with the rotor: unbalance drives it; 5 g mm of the scene at z = 225 mm")
 
     apart = text.replace("radial_stiffness_N_per_um = 20.0   # in every direction across the axis\naxial_stiffness_N_per_um = 5.0 ", "matrix_SI = [[2e7, 0, 0, 0, 0], [0, 1.2e7, 0, 0, 0], [0, 0, 5e6, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 0]] ")

@@ -152,6 +152,21 @@ def test_people_read_likeness_by_test(compared):
     assert "+1.00" in text
 
 
+def test_errors_are_told_in_percent_of_what_was_measured(compared):
+    """In the table, of the frequencies beside them, and in JSON."""
+    console = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    show_comparison(console, compared)
+    rows = [line.split() for line in console.export_text().splitlines()]
+    first = compared.tests[0].modes[0]
+    row = next(row for row in rows if row[:3] == [compared.tests[0].test.id, str(first.number), first.kind])
+    measured, computed, hertz, percent = (float(row[k]) for k in (3, 5, 6, 7))
+    assert hertz == pytest.approx(computed - measured, abs=0.0151)
+    assert percent == pytest.approx(100 * (computed - measured) / measured, abs=0.0061)
+    for test in comparison_json(compared)["tests"]:
+        for mode in test["modes"]:
+            assert mode["error_percent"] == pytest.approx(100 * (mode["computed_Hz"] - mode["measured_Hz"]) / mode["measured_Hz"], rel=1e-9)
+
+
 def test_many_tests_are_a_row_a_mode(compared):
     """Three times the same tests: the mean error of a mode is that of one, its worst that of its worst test; --verbose shows every one."""
     many = replace(compared, tests=compared.tests * 3)

@@ -271,12 +271,16 @@ def test_what_does_not_move_has_no_motion_and_no_spectrum(record):
     assert polar.get_ylim()[1] >= LEAST
 
 
-def test_inspect_tells_what_is_in_it(file, capsys):
+def test_inspect_tells_what_is_in_it(record, spectra, file, capsys):
     assert main(["inspect", str(file)]) == 0
-    told = capsys.readouterr().out
+    told = " ".join(capsys.readouterr().out.split())
     assert "turning at 7200 rpm, 40 C, 30 revolutions" in told
     assert "with a blueprint" in told
-    assert "waterfall of 25 speeds" in told
+    assert f"waterfall of 25 speeds from {spectra[0].speed * 30 / np.pi:.0f} to {spectra[-1].speed * 30 / np.pi:.0f} rpm" in told
+    for i, probe in enumerate((X, Y, AXIAL)):
+        rro, nrro = (1e9 * np.ptp(part[i]) for part in (record.by_lines.repeatable, record.by_lines.nonrepeatable))
+        assert f"{probe}: RRO (repeatable runout) {rro:.1f} nm, NRRO (nonrepeatable) {nrro:.1f} nm peak to valley" in told
+    assert f"line {record.lines[0].frequency:.2f} Hz, {record.lines[0].direction}, {1e9 * record.lines[0].amplitude:.2f} nm: " in told
     assert main(["inspect", str(file), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert len(answer["nonrepeatable_nm"][0]) == len(answer["repeatable_nm"][2]) > 4000

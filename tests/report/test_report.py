@@ -18,11 +18,14 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import group_energy
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.report.figures.report import Peaks
+from thermospindle.report.log.content import bearing_series
 from thermospindle.report.page.comparison import Row, Table, compared
 from thermospindle.report.page.headlines import headlines, misses
-from thermospindle.report.page.report import _page, background, bearing_figures, html, named, stamp, write_report
+from thermospindle.report.page.report import _page, background, bearing_figures, driving_points, html, named, stamp, write_report
+from thermospindle.sim.campaign.campaign import Test
 from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.hammer.test import estimate_of
+from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run
 
@@ -116,6 +119,34 @@ def test_a_machine_on_rollers_alone_has_no_empty_table_of_balls():
     found = Page(str(_page().bearings(bearing_figures(few), few)))
     assert list(found.tables) == ["rollers"]
     assert [row[1] for row in found.tables["rollers"][1:]] == [b.name for b in spindle.roller_bearings]
+
+
+def test_clearances_are_drawn_and_logged_in_micrometres(monkeypatch: pytest.MonkeyPatch):
+    """Rollers mounted with 4 um have them at the reference temperature."""
+    spindle = rollers()
+    few = SimpleNamespace(spindle=spindle, steps=[SimpleNamespace(point=operating_point(spindle, Condition(20.0)))])
+    curves = {}
+    monkeypatch.setattr("thermospindle.report.figures.report.trend", lambda key, temperature, of, label, from_zero: curves.setdefault(key, (label, of)) and "")
+    bearing_figures(few)
+    names = [b.name for b in spindle.roller_bearings]
+    assert curves["clearance"] == ("clearance, µm", {"": {name: pytest.approx([4.0], abs=1e-6) for name in names}})
+    for name in names:
+        assert bearing_series(few, name)["clearance", "µm"] == pytest.approx([4.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(("quantity", "power"), [("receptance", -1), ("mobility", 0), ("accelerance", 1)])
+def test_what_was_measured_is_drawn_as_mobility(run: Run, quantity: str, power: int):
+    """Of one mass on a spring, 1 / (k - m w^2), times i w for a velocity and (i w)^2 for an acceleration; the line at 0 Hz has none."""
+    frequency = np.arange(0.0, 3000.0, 100.0)
+    s = 2j * np.pi * frequency
+    mobility = s / (1e6 + 0.03 * s**2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = mobility * s**power
+    test = Test("a", 20.0, 0.0, frf=Frf(frequency, value[None, None], (1,), (1,), quantity))
+    measured = replace(run, measured=(SimpleNamespace(tests=(test,)),))
+    [curve] = [c for curves in driving_points(measured, run.steps[:1]).values() for c in curves if c.style == "measured"]
+    assert curve.frequency == pytest.approx(frequency[1:])
+    assert curve.mobility == pytest.approx(mobility[1:], rel=1e-12)
 
 
 def test_mode_table(run: Run, page: Page):

@@ -14,7 +14,7 @@ from thermospindle.model.files.stiffness_table import StiffnessTable
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM, in_rpm
-from thermospindle.report.text.states import show_modes, show_told_table
+from thermospindle.report.text.states import show_modes, show_table, show_told_table
 from thermospindle.sim.operating import operating_point
 
 
@@ -46,6 +46,18 @@ def test_the_least_and_the_most_are_told_where_they_lie_between():
     assert said_of([[30.0], [12.5], [30.0]]) == "From 20 to 60 C at 0 rpm: front radial stiffness 30.00 N/um (least 12.50 at 40 C)."
     both = said_of([[20.0, 10.0], [31.0, 22.0], [30.0, 25.0]], (0.0, 6000.0))
     assert both == "From 20 to 60 C and 0 to 6000 rpm: front radial stiffness 20.00 to 25.00 N/um (least 10.00 at 20 C and 6000 rpm, most 31.00 at 40 C and 0 rpm)."
+
+
+def test_every_column_of_a_table_has_its_unit():
+    """Angles, micrometres and newtons as they are, stiffness in N/um of N/m."""
+    si = {
+        "contact_angle_deg": 24.5, "deformation_um": 1.25, "contact_force_N": 7.5, "ball_stiffness_N_per_m": 12.3e6, "preload_N": 16.0,
+        "radial_stiffness_N_per_m": 34.5e6, "axial_stiffness_N_per_m": 11.2e6,
+    }  # fmt: skip
+    console = Console(record=True, width=300, file=io.StringIO())
+    show_table(console, StiffnessTable(np.array([20.0]), np.array([0.0]), {"front": {name: np.full((1, 1), value) for name, value in si.items()}}, {}, {}))
+    [row] = [line.split() for line in console.export_text().splitlines() if "front" in line]
+    assert row == ["20", "0", "front", "24.50", "1.250", "7.500", "12.300", "16.00", "34.50", "11.200"]
 
 
 def test_an_undamped_mode_has_no_damping_less_than_nothing():

@@ -39,6 +39,13 @@ def test_answer_as_json_and_rows(warm):
     assert "163 s" in html
 
 
+def test_what_comes_back_of_a_load_is_told_as_it_is(warm):
+    near = replace(warm, feedback=0.625)
+    assert warmup_json(near)["steady"]["load_feedback"] == 0.625
+    assert "it is near runaway, 62% of a load that is added come back as heat" in text.told(near)
+    assert "it does not run away" in text.told(replace(warm, feedback=0.375))
+
+
 def test_what_moves_most_is_told_of_any_time(warm):
     """A frequency that comes back and a preload that falls on the way are told with their time, not only where they end."""
     frequencies = warm.frequencies.copy()

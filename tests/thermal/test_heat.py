@@ -183,6 +183,45 @@ def test_two_gaps_may_not_share_a_face(spindle):
         two_rings(spindle, gaps=twice)
 
 
+def lubricated(model, **friction):
+    """The same rings whose bearing makes heat."""
+    thermal = model.spindle.thermal
+    return replace(model, spindle=replace(model.spindle, thermal=replace(thermal, friction=replace(thermal.friction, **friction))))
+
+
+def test_slowest_decay_of_two_lumps(spindle):
+    """Each ring is one lump: C T' = -(K - H' b b^T) T with b = (1/2, 1/2); Palmgren's H goes with nu^(2/3), so H' = 2/3 H nu' / nu, a fifth of the film."""
+    conductance, omega = 0.25, 7200 * RPM
+    model = lubricated(two_rings(spindle, conductance), f0=2.0, f1=0.0, viscosity=Law((20.0, 60.0), (100e-6, 40e-6)))
+    friction_at_40 = 1e-10 * 2.0 * (70 * 7200) ** (2 / 3) * 9.1**3 * omega  # W, nu = 70 mm2/s, d_m = 9.1 mm
+    fall = 2 / 3 * friction_at_40 * -1.5 / 70  # W/K
+    film = 50.0 * 2 * np.pi * (9e-3 * 7e-3 + (9e-3**2 - 6e-3**2))
+    stiff = np.array([[conductance, -conductance], [-conductance, conductance + film]]) - fall / 4
+    capacity = 8000.0 * 500.0 * np.pi * np.array([(4e-3**2 - 2e-3**2) * 6e-3, (9e-3**2 - 6e-3**2) * 7e-3])
+    expected = 1 / np.linalg.eigvals(stiff / capacity[:, None]).real.min()
+    assert -fall > 0.2 * film
+    found = heat.slowest(model, model.field(np.full(model.film.size, 40.0)), heat.running(model.spindle, 20.0, omega))
+    assert found == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("back", [0.5, 0.97])
+def test_loads_that_nearly_run_away_settle_at_the_sum_of_their_series(spindle, back):
+    """A load of 10 N grows with the heat it makes; of what is added the share `back` returns: 10 N / (1 - back). Of 97 % plain
+    repetition leaves 0.2 % after all its rounds."""
+    omega = 100.0
+    model = lubricated(two_rings(spindle, 0.25), f0=0.0, f1=0.01)
+    (b,), (weight,) = model.spindle.bearings, model.bearing
+    per_newton = 0.01 * 9.1e-3 * omega * weight @ np.linalg.solve(model.conductance.toarray(), weight)  # K/N
+    still = model.nodal(heat.steady(model, heat.Running(20.0, omega, {b.name: 0.0}))) @ weight
+
+    def drive(nodal):
+        return heat.Running(20.0, omega, {b.name: 10.0 + back / per_newton * float(weight @ nodal - still)})
+
+    field = heat.settled(model, drive, 20.0)
+    assert drive(model.nodal(field)).loads[b.name] == pytest.approx(10.0 / (1 - back), rel=1e-6)
+    assert heat.feedback(model, field, drive) == pytest.approx(back, rel=1e-4)
+
+
 def test_gap_couples_equal_heights(spindle):
     """A temperature that is the same function of height on both sides sends no heat across; one that differs sends h dT dA."""
     model = two_rings(spindle, gaps=(AirGap(("inner", "outer"), 500.0),))

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 import pyuff
 
+from tests.conftest import ROOT
+from thermospindle.diagnosis.runout.lines import look
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Point
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign, write_campaign
 from thermospindle.sim.campaign.runout_record import RunoutRecord, read_runout, same, write_runout
@@ -163,6 +166,30 @@ def test_bad_tables_are_refused(tmp_path: Path, old: str, new: str, words: str) 
     file.write_text(text.replace(old, new))
     with pytest.raises(BadInput, match=words):
         read_campaign(tmp_path / "c")
+
+
+@pytest.mark.parametrize(
+    ("window", "terms", "bins"),
+    [("hann", (0.5, -0.5), 1.5), ("flattop", (0.21557895, -0.41663158, 0.277263158, -0.083578947, 0.006947368), 3.7702)],
+)
+def test_a_sine_in_noise_has_its_amplitude_through_a_window(tmp_path: Path, window: str, terms: tuple[float, ...], bins: float) -> None:
+    """250 nm once a revolution, a third of a bin beside one, zero to peak by the coherent gain a_0; the squares of its bins add up to 1 + sum a_k^2 /
+    2 a_0^2 of its own.
+
+    Without a line there is no more than the standard errors say of noise."""
+    spindle = load(ROOT / "scenes" / "mk7702")  # one line at all: its bearings are numbers
+    n, step = 2900, 1e-3
+    time = step * np.arange(n)
+    shape = sum(a * np.cos(2 * np.pi * k * np.arange(n) / n) for k, a in enumerate(terms))
+    assert n * np.sum(shape**2) / np.sum(shape) ** 2 == pytest.approx(bins, rel=1e-4)
+    value = 2.5e-7 * np.cos(2 * np.pi * 2000 / 60 * time + 0.4) * np.array([[1.0], [0.0]]) + 5e-8 * np.random.default_rng(1).standard_normal((2, n))
+    spectrum = np.fft.rfft(value * shape) * 2 / (n * terms[0])
+    write_runout(tmp_path / "s.csv", RunoutRecord((1, 2), "spectrum", np.fft.rfftfreq(n, step), spectrum, window))
+    seen = look(spindle, Test("t", 20.0, 2000 * RPM, runout=read_runout(tmp_path / "s.csv", POINTS, 2000 * RPM, window)))
+    [line] = seen.seen
+    assert line.frequency == pytest.approx(2000 / 60)
+    assert abs(line.phasor[0]) == pytest.approx(2.5e-7, rel=0.03)
+    assert abs(line.phasor[1]) < 3 * line.sd[1] < 2e-8
 
 
 # ---------------------------------------------------------------- virtual ones

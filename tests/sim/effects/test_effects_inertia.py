@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.effect_points import REST, RUNNING, at
+from tests.effect_points import NONE, REST, RUNNING, at, frequencies, undamped
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices, motion_rows
 from thermospindle.model.rotor.modes import modes
-from thermospindle.model.rotor.poles import poles
 from thermospindle.model.sensors import loaded
 from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
@@ -18,18 +17,6 @@ from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.effects.structure import added_disk, hub_flexibility, sensor_mass
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
-
-NONE = np.zeros((5, 5))
-
-
-def frequencies(point, highest=3000.0):
-    return np.array([m.frequency for m in modes(point.chain, highest=highest)])
-
-
-def undamped(chain):
-    """Natural frequencies (Hz) of a chain that need not turn."""
-    value = poles(matrices(chain)).value
-    return np.sort(np.abs(value[value.imag > 1e-6])) / (2 * np.pi)
 
 
 @pytest.mark.parametrize("speed", [0.0, 7200 * RPM])

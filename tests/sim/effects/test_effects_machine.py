@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT
+from tests.effect_points import with_tool
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.beam import shear_factor, with_theory
 from thermospindle.model.rotor.chain import matrices
@@ -110,11 +111,6 @@ def test_they_have_nothing_to_act_on_in_a_disk_drive(spindle, name):
 # ---------------------------------------------------------------- what holds a tool
 
 
-@pytest.fixture(scope="module")
-def tooled():
-    return load(ROOT / "scenes" / "templates" / "machine-tool.toml")
-
-
 def tip_compliance(spindle, condition, name, values):
     """m/N across at the tip of the tool, at a condition, with an effect."""
     point = operating_point(spindle, condition, [(by_name(name), values)])
@@ -128,8 +124,9 @@ def holder(spindle):
 
 
 @pytest.mark.parametrize("share", [0.1, 0.4])
-def test_taper_contact_gives_as_an_elastic_foundation(tooled, share):
+def test_taper_contact_gives_as_an_elastic_foundation(share):
     """Force and moment in the taper follow from statics: the tip's compliance grows by what the shorter contact gives to both."""
+    tooled = with_tool()
     lateral, tilt, arm = holder(tooled)
     rest = Condition(20.0)
     grown = tip_compliance(tooled, rest, "taper_contact", {"share": share, "tilt_power": 3.0}) - tip_compliance(tooled, rest, "taper_contact", {"share": 0.0, "tilt_power": 3.0})
@@ -138,7 +135,8 @@ def test_taper_contact_gives_as_an_elastic_foundation(tooled, share):
 
 
 @pytest.mark.parametrize("share_of_speed", [0.0, 1.0, 0.5])
-def test_drawbar_force_goes_with_the_root_of_the_force(tooled, share_of_speed):
+def test_drawbar_force_goes_with_the_root_of_the_force(share_of_speed):
+    tooled = with_tool()
     lateral, tilt, arm = holder(tooled)
     condition = Condition(20.0, share_of_speed * tooled.nominal_speed)
     loss, growth = 0.3, 0.5
@@ -148,9 +146,9 @@ def test_drawbar_force_goes_with_the_root_of_the_force(tooled, share_of_speed):
 
 
 @pytest.mark.parametrize("name", ["taper_contact", "drawbar_force"])
-def test_without_a_holder_there_is_nothing_to_act_on(machine, tooled, name):
+def test_without_a_holder_there_is_nothing_to_act_on(machine, name):
     assert refusal(by_name(name), machine) == "nothing to act on here: the scene has no joint with role 'holder'"
-    assert refusal(by_name(name), tooled) is None
+    assert refusal(by_name(name), with_tool()) is None
 
 
 def test_a_disk_sits_once_on_the_end_that_is_hammered(machine):

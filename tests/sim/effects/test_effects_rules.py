@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests import a_tenth_off
+from tests.effect_points import with_tool
 from thermospindle.model.rotor.beam import with_theory
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.effects import CATALOGUE, by_name
@@ -34,11 +35,6 @@ def machine_tool():
     spindle = load(ROOT / "scenes" / "five_bearing")
     structure = with_theory(spindle.structure, spindle.materials, spindle.reference_temperature, (0.0, 0.5))
     return replace(spindle, structure=structure)
-
-
-@cache
-def with_tool():
-    return load(ROOT / "scenes" / "templates" / "machine-tool.toml")
 
 
 @cache

@@ -7,29 +7,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from tests.effect_points import REST, RUNNING, at
+from tests.effect_points import NONE, REST, RUNNING, at, frequencies, undamped
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
 from thermospindle.model.rotor.modes import modes
-from thermospindle.model.rotor.poles import poles
 from thermospindle.model.structure import Body, with_mass
 from thermospindle.sim.effects.roles import in_series
 from thermospindle.sim.effects.structure import shaft_bending, support_anisotropy
 from thermospindle.sim.effects.structure.shaft_bending import Piece
 from thermospindle.sim.operating import operating_point
-
-NONE = np.zeros((5, 5))
-
-
-def frequencies(point, highest=3000.0):
-    return np.array([m.frequency for m in modes(point.chain, highest=highest)])
-
-
-def undamped(chain):
-    """Natural frequencies (Hz) of a chain that need not turn."""
-    value = poles(matrices(chain)).value
-    return np.sort(np.abs(value[value.imag > 1e-6])) / (2 * np.pi)
-
 
 STEEL = (208e9, 0.3)
 

@@ -7,13 +7,11 @@ import pytest
 from scipy.special import jn_zeros
 
 from tests.conftest import ROOT
-from tests.effect_points import REST, at
+from tests.effect_points import NONE, REST, at, frequencies, undamped
 from thermospindle.model.bearing.row import contact_constants
 from thermospindle.model.machine import Condition
 from thermospindle.model.material import Law
-from thermospindle.model.rotor.chain import Element, RotorBase, matrices
-from thermospindle.model.rotor.modes import modes
-from thermospindle.model.rotor.poles import poles
+from thermospindle.model.rotor.chain import Element, RotorBase
 from thermospindle.model.scene.reading import load
 from thermospindle.model.structure import Body
 from thermospindle.sim.effects.structure import (
@@ -30,7 +28,6 @@ from thermospindle.sim.effects.structure import (
 from thermospindle.sim.operating import operating_point
 from thermospindle.thermal.expansion import expand
 
-NONE = np.zeros((5, 5))
 MODULES = (
     flange_fit_loosening,
     mount_compliance,
@@ -41,16 +38,6 @@ MODULES = (
     added_disk,
     sensor_mass,
 )
-
-
-def frequencies(point, highest=3000.0):
-    return np.array([m.frequency for m in modes(point.chain, highest=highest)])
-
-
-def undamped(chain):
-    """Natural frequencies (Hz) of a chain that need not turn."""
-    value = poles(matrices(chain)).value
-    return np.sort(np.abs(value[value.imag > 1e-6])) / (2 * np.pi)
 
 
 def stiffness_of(point, name):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.hammer.pulse import PRE_TRIGGER
 from thermospindle.sim.importing.mapping import RecordForm
-from thermospindle.sim.importing.measured import End
-from thermospindle.sim.importing.records.hits import Hit, fault, limits_of
+from thermospindle.sim.importing.measured import End, Motion
+from thermospindle.sim.importing.records.hits import Hit, _still, fault, limits_of
+from thermospindle.sim.importing.records.spectra import frfs_of
 
 
 @pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])
@@ -53,6 +55,42 @@ def test_hits_that_are_not_of_one_length_are_asked_about_where_the_form_can_be_a
     notes = "\n".join(bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"])
     assert "4 of 6 hits" in notes
     assert "6 of 6 hits" in notes
+
+
+def test_estimators_of_noisy_records():
+    """H1, H2 and Hv as Bendat & Piersol and Rocklin define them, of a response with so much noise that they differ by the coherence and its root. The
+    force ends with its pulse, so that its window cuts nothing off."""
+    random, n, hits, start = np.random.default_rng(2), 4096, 12, 200
+    force = np.zeros((hits, n))
+    force[:, start : start + 3] = random.uniform(50, 90, (hits, 1)) * [0.6, 1.0, 0.6]
+    ringing = np.exp(-40 * np.arange(n) / RATE) * np.sin(2 * np.pi * 500 * np.arange(n) / RATE)
+    response = np.array([np.convolve(f, ringing)[:n] for f in force]) + 12.0 * random.standard_normal((hits, n))
+    cut = slice(start - round(PRE_TRIGGER * RATE), None)
+    f, v = (np.fft.rfft(x[:, cut], axis=-1) for x in (force, response))
+    sff, svv, svf = ((a * b.conj()).mean(axis=0) for a, b in ((f, f), (v, v), (v, f)))
+    h1, h2 = svf / sff, svv / svf.conj()
+    expected = {"H1": h1, "H2": h2, "Hv": np.sqrt(np.abs(h1) * np.abs(h2)) * np.exp(1j * np.angle(h1))}
+    motions = [Motion(Path("a.npz"), "force", End(1), True, 1 / RATE, force, "N"), Motion(Path("a.npz"), "v", End(2), False, 1 / RATE, response, "m/s")]
+    for estimator, value in expected.items():
+        [curve] = frfs_of([(Path("a.npz"), motions)], End(1), RecordForm(estimator=estimator, band_Hz=[300.0, 700.0], exponential_end=1.0)).curves
+        lines = np.rint(curve.frequency * (n - cut.start) / RATE).astype(int)
+        assert len(lines) > 150
+        assert curve.value == pytest.approx(value[lines], rel=1e-9)
+        assert curve.coherence == pytest.approx((np.abs(svf) ** 2 / (sff * svv)).real[lines], rel=1e-9)
+    assert np.median(curve.coherence) < 0.8
+
+
+def test_drift_and_offset_are_taken_out_of_a_response():
+    """An acceleration that is a straight line is drift alone, to half a sample of it; of a velocity what stood before the blow is taken out, and the
+    change stays."""
+    lead, before, n = 16, 80, 900
+    ramp = 3.0 + 0.5 * np.arange(before - lead + n)
+    asked = ramp[None, before - lead :], ramp[None, :before], lead
+    still, share = _still(*asked, np.array([True]))
+    assert np.abs(still).max() < 0.5
+    assert share[0] > 1
+    still, _ = _still(*asked, np.array([False]))
+    assert still[0] == pytest.approx(ramp[before - lead :] - ramp[:before].mean(), rel=1e-12)
 
 
 def test_a_hit_a_row_and_no_hit(tmp_path):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.sim.running.points import SPIN, at
 from thermospindle.model.bearing.ball_row import BallInertia, displacement_under, kinematics, respond
 from thermospindle.model.bearing.kinematics import Kinematics, lines, row_kinematics
 from thermospindle.model.built.drawn import drawn
@@ -17,12 +18,6 @@ from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.structure.shaft_bending import moved
 from thermospindle.sim.operating import OperatingPoint, operating_point
 from thermospindle.sim.running.excitation import chain_response, contact_pushes, excitation, free_displacements, harmonics, response
-
-SPIN = 7200 * np.pi / 30
-
-
-def at(spindle, imperfections: Imperfections, temperature=20.0, speed=SPIN) -> OperatingPoint:
-    return operating_point(replace(spindle, imperfections=imperfections), Condition(temperature, speed))
 
 
 def both(**own) -> Imperfections:

@@ -8,22 +8,17 @@ import pytest
 from scipy.signal import hilbert
 
 from tests.mounting import turning_inside
+from tests.sim.running.points import SPIN, at
 from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
-from thermospindle.sim.operating import OperatingPoint, operating_point
+from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import at_speed, chain_response, excitation, harmonics, response
 from thermospindle.sim.running.moving_balls import ball_contacts, difference_from_linear, run_moving_balls
 from thermospindle.sim.running.run import FLYWHEEL, SpeedProfile, changing_forces, run_spindle, running_model, steady_forces
 
-SPIN = 7200 * RPM
 HUB = [("hub", move) for move in ("x", "y", "z", "tilt_x", "tilt_y")]
-
-
-def at(spindle, imperfections: Imperfections, temperature=20.0, speed=SPIN) -> OperatingPoint:
-    return operating_point(replace(spindle, imperfections=imperfections), Condition(temperature, speed))
 
 
 def lower(**own) -> Imperfections:

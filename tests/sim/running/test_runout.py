@@ -13,9 +13,9 @@ import pytest
 from rich.console import Console
 
 from tests.mounting import turning_inside
+from tests.report.parsed_page import Page
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import row_kinematics
-from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
@@ -35,11 +35,6 @@ SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"
 
 
 # ---------------------------------------------------------------- whole records
-
-
-@pytest.fixture(scope="module")
-def imperfect(spindle):
-    return with_imperfections(spindle, drawn(spindle, 3))
 
 
 @pytest.fixture(scope="module")
@@ -221,6 +216,9 @@ def test_command_line_answers_and_writes(tmp_path, capsys):
     rest = np.array([float(row["hub_x_nrro_um"]) for row in rows])
     assert np.ptp(x) == pytest.approx(answer["total_um"]["radial"], rel=1e-6)
     assert rest.std() == pytest.approx(answer["nrro_rms_um"]["radial"], rel=1e-3)
+    time, angle, revolution = (np.array([float(row[name]) for row in rows]) for name in ("time_s", "angle_rad", "revolution"))
+    assert angle - angle[0] == pytest.approx(2 * np.pi * 120 * (time - time[0]), abs=1e-5)
+    assert set(revolution) == set(range(30))
     assert {"record.csv", "repeatable.csv", "lines.csv", "motion.png", "motion.svg", "spectrum.png", "spectrum.svg"} <= {
         f.name for f in out.iterdir()
     }
@@ -286,6 +284,21 @@ def test_the_report_section_holds_figures_and_lines(found):
     assert html.count("<svg") == html.count("</svg>") == 2
     assert f"{found.lines[0].frequency:.2f}" in html
     assert "asynchronous" in html
+
+
+def test_the_report_section_is_in_nanometres(found):
+    """Peak to valley and rms of the record itself, and amplitudes of lines, to a hundredth."""
+    rows = [row for table in Page(f"<div>{runout_section(found, runout_json(found, 'linear', 'linear', 3))[1]}</div>").tables.values() for row in table]
+    cut = found.by_lines
+    told = {row[0]: row[1:] for row in rows}
+    for words, expected in (
+        ("peak to valley of the record", np.ptp(cut.value[:3], axis=(1, 2))),
+        ("root mean square of the nonrepeatable part", np.sqrt(np.mean(cut.nonrepeatable[:3] ** 2, axis=(1, 2)))),
+    ):
+        assert [float(cell) for cell in told[words]] == pytest.approx(1e9 * expected, abs=0.00501)
+    lines = [(row[0], row[2], float(row[3])) for row in rows if row[2] in ("radial", "axial")]
+    assert len(lines) > 5
+    assert lines == [(f"{g.frequency:.2f}", g.direction, pytest.approx(1e9 * g.amplitude, abs=0.00501)) for g in found.lines[: len(lines)]]
 
 
 def test_signals_of_a_given_harmonic_answer(hot_point):

@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.conftest import SCENE
 from tests.model.test_carrier import TEXT
+from tests.mounting import geared
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import Line
-from thermospindle.model.built.drawn import drawn
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
@@ -28,31 +27,19 @@ SPEED = 7200 * RPM
 RATIOS = [0.5, 2.0, -0.5, -1.0, 1 / 3]
 
 
-@pytest.fixture(scope="module")
-def plain():
-    spindle = load(SCENE)
-    return replace(spindle, imperfections=drawn(spindle, 3))
-
-
-def geared(spindle, ratio):
-    """The same spindle whose hub turns `ratio` times as fast as it says it does."""
-    bodies = tuple(replace(b, speed_ratio=ratio) if b.turns else b for b in spindle.structure.bodies)
-    return replace(spindle, structure=replace(spindle.structure, bodies=bodies))
-
-
 def at(spindle, ratio=1.0):
     """The point at which the hub turns at `SPEED`."""
     return operating_point(geared(spindle, ratio), Condition(40.0, SPEED / ratio))
 
 
 @pytest.fixture(scope="module")
-def direct(plain):
-    return runout(at(plain), path="linear")
+def direct(imperfect):
+    return runout(at(imperfect), path="linear")
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_a_geared_hub_has_the_runout_of_one_without_gears(plain, direct, ratio):
-    point = at(plain, ratio)
+def test_a_geared_hub_has_the_runout_of_one_without_gears(imperfect, direct, ratio):
+    point = at(imperfect, ratio)
     assert whole_turns(point) == direct.averaged.count
     found = runout(point, path="linear")
     assert found.averaged.count == direct.averaged.count
@@ -67,15 +54,15 @@ def test_a_geared_hub_has_the_runout_of_one_without_gears(plain, direct, ratio):
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_so_it_has_in_the_steady_state_and_in_the_nrro_of_a_map(plain, ratio):
-    for name, m in steady_runout(at(plain, ratio)).items():
-        expected = steady_runout(at(plain))[name]
+def test_so_it_has_in_the_steady_state_and_in_the_nrro_of_a_map(imperfect, ratio):
+    for name, m in steady_runout(at(imperfect, ratio)).items():
+        expected = steady_runout(at(imperfect))[name]
         assert (m.repeatable, m.six_sigma) == pytest.approx((expected.repeatable, expected.six_sigma), rel=1e-9, abs=1e-15)
-    assert nrro_rms(Exact(at(plain, ratio), {}, {}, 3)) == pytest.approx(nrro_rms(Exact(at(plain), {}, {}, 3)), rel=1e-9)
+    assert nrro_rms(Exact(at(imperfect, ratio), {}, {}, 3)) == pytest.approx(nrro_rms(Exact(at(imperfect), {}, {}, 3)), rel=1e-9)
 
 
-def test_a_simulated_record_repeats_as_the_part_turns(plain):
-    point = at(plain, 0.5)
+def test_a_simulated_record_repeats_as_the_part_turns(imperfect):
+    point = at(imperfect, 0.5)
     simulated, linear = (runout(point, 0.2, path=path) for path in ("simulated", "linear"))
     assert simulated.averaged.count == linear.averaged.count == 24
     [first] = [g for g in simulated.lines if g.causes and g.causes[0].cause == "unbalance"]
@@ -83,13 +70,13 @@ def test_a_simulated_record_repeats_as_the_part_turns(plain):
     assert simulated.values()[X].repeatable == pytest.approx(linear.values()[X].repeatable, rel=1e-3)
 
 
-def test_a_record_of_less_than_two_revolutions_of_the_part_is_refused(plain):
+def test_a_record_of_less_than_two_revolutions_of_the_part_is_refused(imperfect):
     with pytest.raises(BadInput, match=r"--seconds 0.03: at 1800 rpm the record needs at least two revolutions of the hub, 0.0667 s"):
-        runout(operating_point(geared(plain, 0.25), Condition(40.0, SPEED)), 0.03, path="linear")
+        runout(operating_point(geared(imperfect, 0.25), Condition(40.0, SPEED)), 0.03, path="linear")
 
 
-def test_what_is_written_says_whose_revolutions_and_whose_orders(plain, direct):
-    found = runout(at(plain, 0.5), path="linear")
+def test_what_is_written_says_whose_revolutions_and_whose_orders(imperfect, direct):
+    found = runout(at(imperfect, 0.5), path="linear")
     answer = runout_json(found, "linear", "linear", None)
     assert (answer["speed_rpm"], answer["seen_speed_rpm"]) == pytest.approx((14400, 7200))
     assert answer["seconds"] == pytest.approx(direct.averaged.count / 120)
@@ -186,9 +173,9 @@ def test_of_a_slow_part_some_multiples_are_looked_for_and_those_of_theory():
     assert len(best.frequency) == MOST_WHOLE + 2
 
 
-def test_a_report_names_every_bearing_of_a_line(plain):
+def test_a_report_names_every_bearing_of_a_line(imperfect):
     """At 20 C both rows have the same cage frequency: one line of both."""
-    point = operating_point(plain, Condition(20.0, SPEED))
+    point = operating_point(imperfect, Condition(20.0, SPEED))
     found = runout(point, path="linear")
     answer = runout_json(found, "linear", "linear", None)
     [cage] = [g for g in answer["lines"] if g["name"] == "fc"]
