@@ -96,7 +96,7 @@ def _still(response: Array, before: Array, lead: int, accelerations: Array) -> t
     last = response[:, -tail:].mean(axis=-1)
     first = before.mean(axis=-1) if k >= FEWEST else np.where(accelerations, last, 0.0)
     slope = np.where(accelerations, last - first, 0.0) / (n - tail / 2 + k / 2 - lead)
-    line = first[:, None] + slope[:, None] * (np.arange(n) + k / 2 - lead)
+    line = first[:, None] + slope[:, None] * (np.arange(n) + (k + 1) / 2 - lead)
     still = response - line
     return still, np.abs(line).max(axis=-1) / np.maximum(np.abs(still).max(axis=-1), np.finfo(float).tiny)
 
