@@ -98,7 +98,8 @@ def _still(response: Array, before: Array, lead: int, accelerations: Array) -> t
     slope = np.where(accelerations, last - first, 0.0) / (n - tail / 2 + k / 2 - lead)
     line = first[:, None] + slope[:, None] * (np.arange(n) + (k + 1) / 2 - lead)
     still = response - line
-    return still, np.abs(line).max(axis=-1) / np.maximum(np.abs(still).max(axis=-1), np.finfo(float).tiny)
+    least = np.maximum(np.finfo(float).eps * np.abs(response).max(axis=-1), np.finfo(float).tiny)  # of what is a line and nothing else
+    return still, np.abs(line).max(axis=-1) / np.maximum(np.abs(still).max(axis=-1), least)
 
 
 def _starts(force: Array, strongest: float, apart: int) -> list[int]:
