@@ -27,7 +27,7 @@ EFFECT = Effect(
     equation=(
         "k = k_0 (1 + N / N_cr), N in-plane force per length (tension positive), N / N_cr = stiffening (T - T_ref -+ play) / 40 K for axial "
         "motion and tilt_share times that for tilts, 0 within the play; clamped disc N_cr = 14.68 D / a^2, with one nodal diameter 26.37 D / a^2, "
-        "D = E t^3 / 12 (1 - nu^2), held at its rim N = E t Delta_alpha Delta_T / (1 - nu) "
+        "D = E t^3 / (12 (1 - nu^2)), held at its rim N = E t Delta_alpha Delta_T / (1 - nu) "
         "(Timoshenko & Gere, Theory of Elastic Stability, 1961)"
     ),
     parameters=(

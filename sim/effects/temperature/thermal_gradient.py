@@ -117,7 +117,7 @@ EFFECT = Effect(
         "D = R - (1 - common_share) mean R_outer rings, R = sum_b G_region,b H_b with "
         "K G = (1 W in bearing b), K the steady conduction and convection matrix; "
         "H_b = (M0 + M1) speed at the lubricant's temperature T + sum_c G_bc H_c; "
-        "M0 = 1e-7 f0 (nu n)^(2/3) d_m^3, M1 = f1 P1 d_m (Palmgren; Harris, Rolling Bearing Analysis, 4th ed. 2001)"
+        "M0 = 1e-7 f0 (nu n)^(2/3) d_m^3, of nu n below 2000 160e-7 f0 d_m^3, M1 = f1 P1 d_m, in N mm, mm, rpm, mm2/s (Palmgren; Harris, Rolling Bearing Analysis, 4th ed. 2001)"
     ),
     parameters=(
         scale_parameter(
