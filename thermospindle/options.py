@@ -9,13 +9,14 @@ from functools import cache
 from importlib.metadata import version
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from thermospindle.model.errors import instead
 from thermospindle.model.files.cells import plain_number
 from thermospindle.model.rotor.elements import ELEMENTS, HAMMER
 from thermospindle.model.shaft import THEORIES
 
+Number = TypeVar("Number", int, float)
 HOTTEST, FASTEST = 1e4, 1e8  # C and rpm, up to which numbers are computed with; what no bearing bears only warns
 NEWTONS, SECONDS, MINUTES, NANOMETRES = 1e6, 100.0, 1e5, 1e6  # of a hammer, a record, a warm-up and a probe's noise
 HITS, MULTIPLES = 1000, 100
@@ -81,7 +82,13 @@ def _up_to(largest: float, smallest: float = -inf, unit: str = "") -> Callable[[
             raise argparse.ArgumentTypeError(f"{text}: at least {smallest:g}{unit}, or 0, can be computed with")
         return value
 
-    return number
+    return _bounded(number, f"up to {largest:g}{unit}")
+
+
+def _bounded(read: Callable[[str], Number], limits: str) -> Callable[[str], Number]:
+    """What reads an option's number, with `limits` that its help tells."""
+    read.limits = limits  # type: ignore[attr-defined]
+    return read
 
 
 def _temperature(text: str) -> float:
@@ -101,9 +108,10 @@ def _whole(least: int, most: int, what: str) -> Callable[[str], int]:
 
 
 def _count(most: int) -> Callable[[str], int]:
-    return _whole(1, most, f"a count of one or more, up to {most}")
+    return _bounded(_whole(1, most, f"a count of one or more, up to {most}"), f"1 to {most}")
 
 
+_bounded(_temperature, f"-273.15 to {HOTTEST:g} C")
 _port = _whole(1, 65535, "a port, 1 to 65535")
 _seed = _whole(0, 10**18 - 1, "a whole number from 0 to 18 digits")
 
@@ -285,4 +293,8 @@ def parsers() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     new.add_argument("--like", choices=("hdd", "machine-tool", "grinding", "rotor"), required=True, help="the machine it is like; --out is the new folder, ./NAME by default")
     verb("check", ("starting", "check"), "what the program understands of a scene, what it assumes and what it finds odd; --out draws it")
     verb("inspect", ("inspect", "inspect"), "what a Rerun log of spindle holds, and its FRFs as numbers", what="log")
+    for added in verbs.choices.values():
+        for action in added._actions:
+            if limits := getattr(action.type, "limits", ""):
+                action.help = f"{action.help}; {limits}"
     return parser, dict(verbs.choices)
