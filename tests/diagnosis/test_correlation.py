@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from thermospindle.diagnosis.compare.correlation import (
     DISTINCT,
+    Correlation,
+    _best,
     assurance,
     bands,
     correlate,
@@ -73,6 +76,16 @@ def test_a_sensor_whose_sensitivity_is_off_is_told(spindle, point, factor):
         assert found[node][0] == pytest.approx(factor - 1, abs=0.02)
 
 
+@pytest.mark.parametrize(("own", "told"), [((0.2, 0.2), 0.2), ((0.15, 0.25), 0.2), ((0.1, 0.3), None)])
+def test_a_sensor_whose_own_frfs_differ_is_not_told(own, told):
+    """FRFs of two sensors as computed, of a third exp(own) of that with either hammer: 0.2 is 4 times 0.05 but only 2 times 0.1, where 2.5 times is asked."""
+    computed = np.ones((3, 2, 4))
+    gain = np.exp([[0.0, 0.0], [0.0, 0.0], own])
+    frf = Frf(np.arange(1.0, 5.0), gain[:, :, None] * computed, (1, 2, 3), (1, 2), "mobility")
+    found = off_alone([Correlation(SimpleNamespace(measured=frf), computed, np.ones(4), np.ones(4), None, ())])
+    assert found == ({} if told is None else {3: (pytest.approx(np.expm1(told)), pytest.approx(0.0))})
+
+
 def test_one_channel_off_is_seen_where_it_is(spindle, point):
     value = point.frf(LINES)
     value[2] *= -0.5
@@ -95,6 +108,12 @@ def test_a_shifted_model_is_told_by_how_much(spindle, point, shift):
     assert found.whole.shift == pytest.approx(shift, abs=2e-4)
     assert found.whole.fdac > 0.999
     assert found.whole.csac < 0.995  # blind to much of it under the broad lateral pair
+
+
+@pytest.mark.parametrize("vertex", [-0.0123, 0.0, 0.0031, 0.0046])
+def test_the_best_shift_of_a_parabola_is_its_vertex(vertex):
+    shifts = np.linspace(-0.02, 0.02, 41)
+    assert _best(shifts, 1 - 400 * (shifts - vertex) ** 2) == pytest.approx(vertex, abs=1e-9)
 
 
 def test_no_shift_is_told_where_nothing_resonates(spindle, point):

@@ -13,6 +13,7 @@ import pytest
 import thermospindle as ts
 from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.cli import main
+from thermospindle.diagnosis.draft.answer import Place
 from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import fit
@@ -168,6 +169,14 @@ def test_what_is_no_covariance_is_refused(damaged, tmp_path):
     (tmp_path / "d.json").write_text(json.dumps(raw), encoding="utf-8")
     with pytest.raises(BadInput, match="elements that drift"):
         draft(tmp_path / "d.json", "own")
+
+
+def test_covariance_of_logarithms_by_hand():
+    """Of ln(1 + c), by 1 / (1 + c): a stiffness that is halved, and one a quarter larger, both known to 1 % of what was."""
+    rows = [{"temperature_C": t, "speed_rpm": 0.0, "relative": c, "sd": 0.01} for t, c in ((20.0, -0.5), (60.0, 0.25))]
+    change, covariance = Place(element="mount", unit="%", change=rows, change_covariance=[[1e-4, 5e-5], [5e-5, 1e-4]]).logarithmic
+    assert change == pytest.approx([100 * np.log(0.5), 100 * np.log(1.25)])
+    assert covariance == pytest.approx(np.array([[4.0, 0.8], [0.8, 0.64]]))  # per cent: sd 2 and 0.8, correlation a half
 
 
 CONDITIONS = [Condition(t, n * RPM) for t, n in ((20, 0), (20, 7200), (28, 0), (36, 0), (44, 7200), (52, 0), (60, 0), (60, 7200))]

@@ -69,3 +69,16 @@ def test_tests_of_one_temperature_are_one_place_of_a_law_of_temperature():
     assert not [f for f in found if f.law.name == "sigmoid in temperature"]  # untested, while what is tested fits
     beyond = found[0].law(np.array([10.0, 50.0]), np.zeros(2), found[0].values[2:])
     assert beyond == pytest.approx([0.0, 0.75**0.72], abs=0.02)
+
+
+@pytest.mark.parametrize("power", [0.6, 1.0, 2.5])
+def test_errors_of_a_power_are_those_of_its_derivatives(power):
+    """Size s and power p of s x^p: derivatives x^p and s x^p ln x, of independent errors."""
+    at, sd, size = np.arange(20.0, 61.0, 5.0), 0.02, -8.0
+    law = next(law for law in laws(at, np.zeros(len(at))) if law.name == "power of temperature")
+    x = (at - 20) / 40
+    found = fit_law(law, at, np.zeros(len(at)), size * x**power, np.eye(len(at)) / sd)
+    a = np.stack([x**power, size * x**power * np.log(np.maximum(x, 1e-300))], axis=1) / sd
+    assert found.values[[0, 2]] == pytest.approx([size, power], rel=1e-5)
+    assert found.sd[[0, 2]] == pytest.approx(np.sqrt(np.diag(np.linalg.inv(a.T @ a))), rel=1e-3)
+    assert found.sd[1] == 0.0

@@ -16,6 +16,7 @@ from thermospindle.cli import main
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, ladder, named_by
+from thermospindle.diagnosis.ladder.step import fitted
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
@@ -74,15 +75,17 @@ def test_the_error_does_not_fall_with_a_wrong_effect(lagging):
 def test_steps_as_drawn_are_what_mujoco_says(spindle, lagging):
     """Errors in Hz against the modes of MuJoCo's linearised models, which the ladder does not use."""
     for name, form in zip(("fixed stiffness", "axial equilibrium"), FORMS[::2], strict=True):
-        off, shifts = [], []
+        off, shifts, relative = [], [], []
         for test in lagging.campaign.tests:
             own = [
                 m.frequency for m in operating_point(spindle, Condition(test.temperature), form.applied).modes if 400 < m.frequency < 6000
             ]
             off.append(np.array(own) - [r.frequency for r in test.modes])
+            relative.append(off[-1] / [r.frequency for r in test.modes])
             shifts.append(off[-1] - off[0])
         step = lagging.step(name)
         assert step.rms_Hz == pytest.approx(np.sqrt(np.mean(np.square(off))), rel=1e-5)
+        assert step.rms_percent == pytest.approx(100 * np.sqrt(np.mean(np.square(relative))), rel=1e-5)
         assert step.rms_shift_Hz == pytest.approx(np.sqrt(np.mean(np.square(shifts[1:]))), rel=1e-4)
         assert step.held_out == step.error
         assert step.evidence == pytest.approx(-0.5 * step.error**2 * len(lagging.measured.test))
@@ -96,6 +99,15 @@ def test_residuals_are_errors_over_standard_errors(lagging):
     own = lagging.measured.test == 0
     assert shown.frequency[:, 0] == pytest.approx(((step.frequency - lagging.measured.frequency) / SD)[own], rel=1e-9)
     assert np.sqrt(np.mean(shown.frequency**2)) == pytest.approx(step.error, rel=0.02)  # of logarithms there
+
+
+def test_errors_of_fitted_steps_are_rms_too(lagging):
+    """Of frequencies alone, in standard errors; logarithms there. Of squares that are nine a number, three."""
+    m = lagging.measured
+    for step in (lagging.step(TOLERANCES), lagging.step(DISCREPANCY), lagging.top):
+        assert step.error == pytest.approx(np.sqrt(np.mean(((step.frequency - m.frequency) / SD) ** 2)), rel=0.02)
+    own = lagging.step(TOLERANCES).fitted
+    assert fitted(replace(own, fit=replace(own.fit, chi2=9.0 * len(m.test))), m, "far", (0.0, 0.0), "").error == pytest.approx(3.0)
 
 
 def test_dampings_whose_errors_nobody_told_are_shown_in_per_cent(lagging):

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from tests.conftest import SCENE
 from tests.mounting import geared
+from thermospindle.diagnosis.runout import compare as runout_compare
 from thermospindle.diagnosis.runout.compare import compare_runout
 from thermospindle.diagnosis.runout.explanation import variants
 from thermospindle.diagnosis.runout.fit import families, fit_family, merged
@@ -15,10 +17,12 @@ from thermospindle.diagnosis.runout.sources import sources
 from thermospindle.diagnosis.runout.verdict import _fitted, diagnose_runout
 from thermospindle.model.bearing.kinematics import lines, row_kinematics
 from thermospindle.model.built.imperfections import Imperfections
+from thermospindle.model.carrier import unbalanced
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.sim.campaign import simulated
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import by_name, usable
 from thermospindle.sim.operating import operating_point
@@ -31,6 +35,73 @@ SPEED = 7200 * RPM
 def made(imperfect):
     """What the hub shows at `SPEED`, whatever turns it."""
     return runout_campaign(imperfect, [Condition(40.0, SPEED)], 0.5, path="linear")
+
+
+@pytest.fixture
+def known(imperfect, monkeypatch):
+    """A spindle whose unbalance outdoes what its balls show, and its record without noise, with the balls where the scene has them."""
+    spindle = replace(imperfect, imperfections=replace(imperfect.imperfections, unbalance=1e-5))
+    monkeypatch.setattr(simulated, "set_down", lambda own, balls, random: own)
+    return spindle, runout_campaign(spindle, [Condition(40.0, SPEED)], 0.5, path="linear", noise=0.0)
+
+
+def spectrum(record):
+    n = record.value.shape[1]
+    return replace(record, kind="spectrum", axis=np.fft.rfftfreq(n, record.step), value=np.fft.rfft(record.value) * 2 / n)
+
+
+def test_parts_and_lines_of_a_record_by_its_revolutions(known):
+    """59 revolutions of 1 / 120 s: their mean, what it leaves, and the line once per revolution. The scene made the record: computed is as
+    measured, but for the speed of the cage, which half a second does not tell exactly."""
+    spindle, made = known
+    record, [found] = made.tests[0].runout, compare_runout(spindle, made)
+    value = record.value - record.value.mean(axis=1, keepdims=True)
+    cut = CubicSpline(record.axis, value, axis=1)(np.arange(59 * 186) / (120 * 186)).reshape(len(value), 59, 186)
+    repeats, rest = cut.mean(axis=1), (cut - cut.mean(axis=1, keepdims=True)).reshape(len(value), -1)
+    for part, own in ((found.rro, repeats), (found.nrro, rest)):
+        assert [p.measured_rms for p in part] == pytest.approx(own.std(axis=1), rel=1e-3)
+        assert [p.measured for p in part] == pytest.approx(np.ptp(own, axis=1), rel=0.02)
+        assert [p.computed_rms for p in part] == pytest.approx(own.std(axis=1), rel=0.03, abs=0.01 * own.std(axis=1).max())
+        assert [p.computed for p in part] == pytest.approx(np.ptp(own, axis=1), rel=0.1, abs=0.01 * np.ptp(own, axis=1).max())
+    once = dict(zip(record.nodes, 2 * np.abs(np.mean(cut * np.exp(-2j * np.pi * np.arange(186) / 186), axis=(1, 2))), strict=True))
+    lines = [g for g in found.lines if g.order == pytest.approx(1.0) and once[g.node] > 1e-8]
+    assert len(lines) == 4
+    assert [g.measured for g in lines] == pytest.approx([once[g.node] for g in lines], rel=0.02)
+    assert [g.computed for g in lines] == pytest.approx([once[g.node] for g in lines], rel=0.02)
+
+
+def test_parts_of_a_spectrum_by_its_bins(known):
+    """Mean squares of the lines at whole orders, and of all others."""
+    spindle, made = known
+    [test] = made.tests
+    bins = spectrum(test.runout)
+    [found] = compare_runout(spindle, replace(made, tests=(replace(test, runout=bins),)))
+    squares = np.abs(bins.value[:, 1:]) ** 2 / 2
+    whole = np.arange(1, bins.value.shape[1]) % 60 == 0
+    for part, own, within in ((found.rro, squares[:, whole], 0.02), (found.nrro, squares[:, ~whole], 0.15)):  # lines of both bearings beat
+        rms = np.sqrt(own.sum(axis=1))
+        assert [p.measured_rms for p in part] == pytest.approx(rms, rel=within, abs=0.02 * rms.max())
+        assert [p.computed_rms for p in part] == pytest.approx(rms, rel=within, abs=0.02 * rms.max())
+
+
+def test_errors_of_an_amplitude_are_of_the_record_and_of_spindles_of_one_drawing(monkeypatch):
+    """Half the square of a complex error is along its phasor: of white noise 4 / n of its variance, and of unbalance of the scene's size,
+    static and couple. Nothing else scatters where no balls roll."""
+    scene = load(SCENES / "mk7702")
+    height, sizes, n, noise = unbalanced(scene).z, (50e-6, 2e-6), 6250, 1e-6
+    at = [Condition(20.0, 2000 * RPM)]
+    each = sizes, (sizes[0], 0.0), (0.0, sizes[1])
+    every = [replace(scene, imperfections=Imperfections(unbalance=u, unbalance_z=height, couple_unbalance=c)) for u, c in each]
+    made, *alone = (runout_campaign(s, at, 0.3, path="linear", noise=e) for s, e in zip(every, (noise, 0.0, 0.0), strict=True))
+    assert made.tests[0].runout.value.shape[1] == n
+    squares = sum(2 * campaign.tests[0].runout.value.var(axis=1) for campaign in alone)  # of amplitudes; ten whole revolutions
+    monkeypatch.setattr(runout_compare, "STARTS", 1)
+    [found] = compare_runout(every[0], made)
+    nodes = made.tests[0].runout.nodes
+    assert len(found.lines) == len(nodes)
+    assert [g.scatter for g in found.lines] == pytest.approx([np.sqrt(squares[nodes.index(g.node)] / 2) for g in found.lines], rel=1e-3)
+    assert [g.measured_sd for g in found.lines] == pytest.approx([noise * np.sqrt(2 / n)] * len(nodes), rel=0.4)
+    assert np.sqrt(np.mean([g.measured_sd**2 for g in found.lines])) == pytest.approx(noise * np.sqrt(2 / n), rel=0.2)
 
 
 def at_ratio(campaign, ratio):
@@ -63,9 +134,7 @@ def test_a_geared_hub_compares_as_one_without_gears(imperfect, made, ratio):
 def test_a_spectrum_parts_what_repeats_by_what_is_seen(imperfect, made):
     """The once-per-revolution line of a hub at half the speed of the spindle is at half an order of it, and repeats."""
     [test] = made.tests
-    record = test.runout
-    bins = replace(record, kind="spectrum", axis=np.fft.rfftfreq(record.value.shape[1], record.step), value=np.fft.rfft(record.value) * 2 / record.value.shape[1])
-    spectra = replace(made, tests=(replace(test, runout=bins),))
+    spectra = replace(made, tests=(replace(test, runout=spectrum(test.runout)),))
     [direct], [found] = compare_runout(imperfect, spectra), compare_runout(geared(imperfect, 0.5), at_ratio(spectra, 0.5))
     assert direct.rro[0].computed_rms > 1e-10
     for part in ("rro", "nrro"):

@@ -12,11 +12,13 @@ from rich.console import Console
 
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.compare.constant import constant_errors
+from thermospindle.diagnosis.compare.correlation import Correlation
 from thermospindle.report.page.compare import sections
 from thermospindle.report.text.compare import comparison_json, constant_words, show_comparison, verdict
-from thermospindle.report.verbs.compare import _beyond, _by_law_of_damping
+from thermospindle.report.verbs.compare import _beyond, _by_law_of_damping, _louder
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.campaign.modes import ModeRow
+from thermospindle.sim.identification.frf import Frf
 
 
 def test_the_whole_is_one_percent_low(compared):
@@ -194,3 +196,14 @@ def test_hysteretic_damping_is_said_where_modes_are_damped_much():
     [told] = said(exact, 0.125)
     assert told.startswith("mode 9: is damped by up to 12 % of critical, and measured higher than computed: poles of hysteretic damping (a complex stiffness, as of rubber) lie up to 1.6 % above")
     assert said(4727.0, 0.125) == said(4600.0, 0.125) == said(exact, 0.02) == said(exact, 0.125, sd=50.0) == said(5200.0, 0.125) == []
+
+
+@pytest.mark.parametrize(("factor", "told"), [(10.0, "20 dB larger than computed ones"), (0.5**4, "24 dB smaller than computed ones"), (1.2, "")])
+def test_a_factor_of_all_frfs_is_told_with_its_dB(factor, told):
+    """20 dB are ten times an amplitude; 24 dB a sixteenth."""
+    computed = np.ones((3, 2, 4), complex)
+    frf = Frf(np.arange(1.0, 5.0), factor * computed, (1, 2, 3), (1, 2), "mobility")
+    correlation = Correlation(SimpleNamespace(measured=frf), computed, np.ones(4), np.ones(4), None, ())
+    said = _louder(SimpleNamespace(tests=[SimpleNamespace(correlation=correlation), SimpleNamespace(correlation=None)]))
+    assert [s.partition(", all alike")[0] for s in said] == ([f"measured FRFs are {told}"] if told else [])
+    assert not told or said[0].endswith(f"off by a factor of about {max(factor, 1 / factor):.0f}")

@@ -11,13 +11,14 @@ from rich.console import Console
 
 from tests.sim.resonance.conftest import NOMINAL
 from thermospindle.cli import main
+from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.sense import of_conditions
 from thermospindle.model.units import RPM
 from thermospindle.report.log.turning.map import summary
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, nearby, sentences, show_map, told
-from thermospindle.sim.resonance.found import Coincidence, Interpolated, ResonanceMap
+from thermospindle.sim.resonance.found import Coincidence, Interpolated, ResonanceMap, Track
 from thermospindle.sim.resonance.map import _with, resonance_map
 
 
@@ -170,3 +171,17 @@ def test_many_crossings_are_told_by_the_strongest_and_a_number(met):
     assert told(many)[-1] == "So do 3 weaker lines between 20 and 58.5 C; all are in coincidences.csv of spindle map --out, and in its --json."
     few = replace(met, coincidences=(crossed,) * (SAID + 1))
     assert told(few) == sentences(few)
+
+
+@pytest.mark.parametrize(("cause", "unit"), [("inner waviness", "um"), ("unbalance", "g mm"), ("cage unbalance", "g mm")])
+def test_numbers_of_a_coincidence_have_the_units_of_their_keys(cause, unit):
+    """Metres, rad/s and shares told in um, rpm and per cent."""
+    line = Line("front", cause, 3, "3x", "radial", -1, 360.0)
+    track = Track(4, "rocking", "forward", np.full((1, 1), 350.0), 0.01)
+    c = Coincidence(line, track, Condition(33.0, 240 * np.pi), 360.0, 361.0, 0.5, 2.5e-7, 3e-9, -0.0275, 4e-8, True)
+    found = ResonanceMap(load("mk7702"), c.condition, np.array([33.0]), np.array([240 * np.pi]), (track,), (), (), (c,), *np.zeros((2, 1, 3)), None)
+    [told] = map_json(found)["coincidences"]
+    numbers = {"speed_rpm": 7200.0, "frequency_Hz": 360.0, "mode_frequency_Hz": 361.0, "margin_percent": -2.75}
+    numbers |= {"strength_um": 0.25, "strength_um_per_unit": 0.003, "nrro_um": 0.04}
+    assert {key: told[key] for key in numbers} == pytest.approx(numbers)
+    assert (told["unit"], told["line_whirl"], told["temperature_C"]) == (unit, "backward", 33.0)
