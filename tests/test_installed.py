@@ -183,7 +183,7 @@ def test_types_are_seen(way, wheel, users, tmp_path_factory):
 
 def test_the_wheel_holds_every_module_and_all_data(wheel):
     inside = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-    wanted = {f"thermospindle/{name}" for name in ("__init__.py", "__main__.py", "cli.py", "failing.py", "front.py", "options.py", "plugin.py", "py.typed", "testing.py")}
+    wanted = {f"thermospindle/{name}" for name in ("__init__.py", "__main__.py", "arguments.py", "cli.py", "failing.py", "front.py", "options.py", "plugin.py", "py.typed", "testing.py", "verbs.py")}
     for folder in FOLDERS:
         files = (f.relative_to(ROOT) for f in (ROOT / folder).rglob("*") if f.is_file() and "__pycache__" not in f.parts)
         wanted |= {f"thermospindle/{f.as_posix()}" for f in files}

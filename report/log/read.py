@@ -6,6 +6,7 @@ under `numbers/` as components with plain names; `Log.table` gives those of one 
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,12 +21,12 @@ from rerun.chunk import RrdReader
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.apart import read_apart
 from thermospindle.model.types import Array
-from thermospindle.sim.campaign.form import plain_name
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.identification.peak import Peak
 
 APPLICATION = "thermospindle"
 KINDS = ("run", "map", "runout", "warmup", "study")
+PLAIN = re.compile(r"[A-Za-z0-9_+-][A-Za-z0-9._+ -]*")
 NEEDS = {"run": "/numbers/peaks", "map": "/numbers/modes", "runout": "/signals", "warmup": "/numbers/warmup", "study": "/numbers/rows"}
 
 
@@ -113,12 +114,10 @@ class Log:
 
     @cached_property
     def frfs(self) -> dict[str, Frf]:
-        """By test; BadInput for an id that is no plain name, as those of a campaign's tests are: files are called by it."""
+        """By test; BadInput for an id that could be a path, for files are called by it."""
         for _, about in self.tests:
-            try:
-                plain_name(about["id"][0])
-            except ValueError as error:
-                raise BadInput(f"{self.path}: the test {about['id'][0]!r}: {error}") from None
+            if not PLAIN.fullmatch(about["id"][0]):
+                raise BadInput(f"{self.path}: the test {about['id'][0]!r}: must be letters, digits, '.', '_', '+', '-' and spaces, as those of a campaign and what is computed of them")
         return {about["id"][0]: self._frf(entity, about) for entity, about in self.tests}
 
     def _frf(self, entity: str, about: Mapping[str, list[Any]]) -> Frf:

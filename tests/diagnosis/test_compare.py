@@ -76,7 +76,7 @@ def test_a_window_left_in_the_frfs_is_no_misfit(spindle):
     """An exponential window of 60 1/s nearly triples the first mode's decay; both the modes and FRAC must know."""
     campaign = exact(spindle, (20.0,))
     point, (test,) = operating_point(spindle, Condition(20.0)), campaign.tests
-    shift = point.frf(LINES - 60j / (2 * np.pi)) - point.frf(LINES)
+    shift = point.frf(LINES, 60.0) - point.frf(LINES)
     windowed = replace(test, window_decay=60.0, frf=replace(test.frf, value=test.frf.value + shift))
     found = compare(spindle, replace(campaign, tests=(windowed,)))
     assert min(v for v in found.tests[0].frac.values() if v is not None) > 0.998  # noise as before, on smaller peaks
