@@ -1,7 +1,9 @@
-"""What pyproject.toml cannot say: an editable install of a checkout puts one folder on the path, `editable/`, which holds nothing but `thermospindle`.
+"""What pyproject.toml cannot say: an editable install of a checkout puts one folder on the path,
+`editable/`, which holds nothing but `thermospindle`.
 
-Type checkers follow a path and no import hook, which is what setuptools makes of folders named one by one. Where git has made no links (Windows
-without developer mode, the source package) it makes that hook: all runs, and type checkers see the package from the checkout's own folder.
+Type checkers follow a path and no import hook, which is what setuptools makes of folders named one
+by one. Where git has made no links (Windows without developer mode, the source package) it makes
+that hook: all runs, and type checkers see the package from the checkout's own folder.
 """
 
 from pathlib import Path

@@ -114,7 +114,8 @@ def scene_with(
     out: Path,
     catalogue: Sequence[Effect] = CATALOGUE,
 ) -> NewScene:
-    """Write the scene of `target` with effects at given `values` and its toleranced parameters off by `deviations` from what they are there.
+    """Write the scene of `target` with effects at given `values` and its toleranced parameters off
+    by `deviations` from what they are there.
 
     `tests` are those it was fitted to, and `source` says by whom; the rest is as in `new_scene`.
     """

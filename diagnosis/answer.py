@@ -1,4 +1,5 @@
-"""Answers of `spindle diagnose --json`, as they are read again; and what `add` and the workbench take of one: its candidates with their values, and the tolerances fitted beside the best."""
+"""Answers of `spindle diagnose --json`, as they are read again; and what `add` and the workbench
+take of one: its candidates with their values, and the tolerances fitted beside the best."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ OF_TEST, OF_CHANNEL = "temperature of ", "gain of channel "  # not the spindle's
 
 @dataclass(frozen=True)
 class Offered:
-    """A candidate: its effects, their parameters, those of which the data have another law than they assume, and its probability (1 in an answer without any)."""
+    """A candidate: its effects, their parameters, those of which the data have another law than
+    they assume, and its probability (1 in an answer without any)."""
 
     effects: tuple[str, ...]
     parameters: Mapping[str, Any]
@@ -31,8 +33,8 @@ class Offered:
 
 @dataclass(frozen=True)
 class Answer:
-    """What `add` takes of an answer of `diagnose --json`: candidates, the tolerances fitted beside `best` (effects, or where none is named what drifts), and the
-    elements of which a law can be `drafted`."""
+    """What `add` takes of an answer of `diagnose --json`: candidates, the tolerances fitted beside `best`
+    (effects, or where none is named what drifts), and the elements of which a law can be `drafted`."""
 
     candidates: tuple[Offered, ...]
     best: tuple[str, ...]  # empty: nothing was taken for true, and the tolerances are those fitted without any
@@ -44,7 +46,8 @@ class Answer:
 
 @contextmanager
 def told_by(where: str, what: str) -> Iterator[None]:
-    """Within it, whatever is not as an answer has it ends in a `BadInput`: `where` it is from is what that begins with, and `what` is looked for there what it ends with."""
+    """Within it, whatever is not as an answer has it ends in a `BadInput`: `where` it is from is
+    what that begins with, and `what` is looked for there what it ends with."""
     try:
         yield
     except BadInput:
@@ -114,7 +117,8 @@ def _finite(value: Any) -> float:
 
 
 def offered_for(effects: Sequence[Effect], answer: Answer, file: Path) -> Offered:
-    """The candidate of these effects, or what drafted ones are of, and no others, else the first that has them all: beside another effect one has another size; of elements that drift the answer has no other values than a draft."""
+    """The candidate of these effects, or what drafted ones are of, and no others, else the first that has them all:
+    beside another effect one has another size; of elements that drift the answer has no other values than a draft."""
     names = [called_in(answer, e) for e in effects]
     having = [c for c in answer.candidates if set(names) <= set(c.effects)]
     found = next((c for c in having if set(names) == set(c.effects)), having[0] if having else None)

@@ -1,9 +1,9 @@
 """Toleranced parameters of a spindle fitted to the lines of one test's FRFs, all else taken as known.
 
-For scripts that follow one parameter through virtual tests: nothing is extracted, every line counts with its own standard error, so
-nothing of the record is lost (maximum likelihood in the frequency domain: Pintelon & Schoukens, *System Identification*, 2012, ch. 9).
-Where the model may be wrong it is the wrong tool: thousands of lines then agree on a wrong value. `diagnosis.inference` grants the model errors of its own for
-that reason.
+For scripts that follow one parameter through virtual tests: nothing is extracted, every line counts with its
+own standard error, so nothing of the record is lost (maximum likelihood in the frequency domain: Pintelon &
+Schoukens, *System Identification*, 2012, ch. 9). Where the model may be wrong it is the wrong tool: thousands
+of lines then agree on a wrong value. `diagnosis.inference` grants the model errors of its own for that reason.
 """
 
 from __future__ import annotations

@@ -33,9 +33,10 @@ STEPS = (4.0, 7.0, 18.0, 15.0, 6.0, 0.1, 2.0, 8.0)  # of progress, beside one a 
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """What would have to change from test to test: without any catalogue an element, or an effect of it whose size in every test is the data's own: its `values` but the
-    size (None of an element), and the condition `at` which its formula is asked in every test (None: at the test's own). `change` (tests,) with `covariance` (tests, tests) in `unit`,
-    what they go with, and the ln evidence over the model without effects."""
+    """What would have to change from test to test: without any catalogue an element, or an effect of it whose
+    size in every test is the data's own: its `values` but the size (None of an element), and the condition `at`
+    which its formula is asked in every test (None: at the test's own). `change` (tests,) with `covariance`
+    (tests, tests) in `unit`, what they go with, and the ln evidence over the model without effects."""
 
     element: str
     unit: str
@@ -76,9 +77,10 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """All that `spindle diagnose` tells; `own_laws` how much of the effects that the verdict names the data have in every test, where that is not by their law;
-    `detectable`: of every effect the variant and size (from neutral, in its unit) that would have shown; `may_hide` what could act beside what the
-    verdict names, unseen; `unable` the effects that were no explanation of some test because they cannot be worked out there, and why."""
+    """All that `spindle diagnose` tells; `own_laws` how much of the effects that the verdict names the data have
+    in every test, where that is not by their law; `detectable`: of every effect the variant and size (from
+    neutral, in its unit) that would have shown; `may_hide` what could act beside what the verdict names, unseen;
+    `unable` the effects that were no explanation of some test because they cannot be worked out there, and why."""
 
     spindle: Spindle
     campaign: Campaign
@@ -126,7 +128,8 @@ def diagnose(
 
 
 def unable(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> dict[str, str]:
-    """Of effects of the catalogue those that cannot be worked out at the conditions of some test, however small, and why: screening takes them for nothing there."""
+    """Of effects of the catalogue those that cannot be worked out at the conditions of some test,
+    however small, and why: screening takes them for nothing there."""
     found, nothing = dict[str, str](), np.zeros(len(model.parameters))
     for m in {m.name: m for m in reversed(mechanisms) if m.kind == "law"}.values():
         step = SIZE_STEP * m.size.prior_sd
@@ -140,7 +143,8 @@ def unable(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> dict[str, s
 
 
 def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> CampaignModel:
-    """The model of a campaign beside the data of all its tests; BadInput for points on bodies that the scene has not, and for tables of more modes than it may have there."""
+    """The model of a campaign beside the data of all its tests; BadInput for points on bodies that
+    the scene has not, and for tables of more modes than it may have there."""
     check_points(spindle, campaign)
     noise = expected_noise(spindle)
     data = in_parallel(partial(_data, campaign.noise, noise, spindle.tolerances.gain), campaign.tests, done=lambda d: progress(f"{d.test.id} read"))
@@ -155,8 +159,8 @@ def _data(stated: Noise | None, expected: Noise, gain: float, test: Test) -> Tes
 
 
 def _own_laws(found: Search, verdict: Verdict) -> tuple[Drift, ...]:
-    """Every effect that the verdict names and that is likelier with a law of the data's own, or departs from the one assumed, once: from the most probable
-    explanation that has it."""
+    """Every effect that the verdict names and that is likelier with a law of the data's own, or
+    departs from the one assumed, once: from the most probable explanation that has it."""
     drifts: dict[str, Drift] = {}
     conditions = [d.condition for d in found.model.tests]
     for c in verdict.candidates:
@@ -168,7 +172,8 @@ def _own_laws(found: Search, verdict: Verdict) -> tuple[Drift, ...]:
 
 
 def departs(h: Hypothesis, k: int, conditions: Sequence[Condition]) -> bool:
-    """Whether the data have mechanism `k` of an explanation otherwise than by its law: by much of its usual size, or by more than all that they have of it by its law, however little that is."""
+    """Whether the data have mechanism `k` of an explanation otherwise than by its law: by much of
+    its usual size, or by more than all that they have of it by its law, however little that is."""
     m, departure = h.mechanisms[k], h.evidence.learned.departures[k]
     change, law = h.evidence.sizes[k] - m.size.neutral, shared(m, conditions)
     by_law = law * (law @ change) / max(float(law @ law), 1e-300)

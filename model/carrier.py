@@ -1,8 +1,9 @@
 """Which turning part an unbalance or a radial load acts on: the one that a scene names, or the one that turns at its height.
 
-Decided by what is drawn, never by where a mesh has its nodes: a shaft is at the heights between its ends, a body made of regions at those of its regions, and a
-body given by its mass, which has no length, at that of its centre of mass alone. A plane at the very height of such a centre is that body's, whatever shaft passes through
-it. Where nothing turns, it is the nearest part. Several parts at one height cannot be told apart, and one must be named.
+Decided by what is drawn, never by where a mesh has its nodes: a shaft is at the heights between its ends, a body
+made of regions at those of its regions, and a body given by its mass, which has no length, at that of its centre
+of mass alone. A plane at the very height of such a centre is that body's, whatever shaft passes through it. Where
+nothing turns, it is the nearest part. Several parts at one height cannot be told apart, and one must be named.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from thermospindle.model.shaft import SAME_HEIGHT
 from thermospindle.model.structure import Body
 
 UNBALANCE = "imperfections.unbalance_"
-"""How the keys of a scene begin that tell the height (`z_mm`) and the part (`body`) of an unbalance; those of radial loads begin as `RadialLoad.key` says."""
+"""How the keys of a scene begin that tell the height (`z_mm`) and the part (`body`) of an
+unbalance; those of radial loads begin as `RadialLoad.key` says."""
 
 Spans = tuple[tuple[float, float], ...]
 
@@ -31,8 +33,8 @@ def unbalanced(spindle: Spindle) -> Body:
 
 
 def permissible_unbalance(spindle: Spindle, body: Body, grade: float) -> float:
-    """Unbalance (kg m) that a balance `grade` G (m/s) permits what turns together with a body: its mass times G over its own speed where the spindle turns at its nominal one (ISO
-    21940-11:2016, e = G / speed)."""
+    """Unbalance (kg m) that a balance `grade` G (m/s) permits what turns together with a body: its mass
+    times G over its own speed where the spindle turns at its nominal one (ISO 21940-11:2016, e = G / speed)."""
     mass = sum(b.mass for b in spindle.structure.bodies if b.turns and b.speed_ratio == body.speed_ratio)
     return mass * grade / (spindle.nominal_speed * abs(body.speed_ratio or 1.0))
 

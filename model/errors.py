@@ -76,5 +76,6 @@ def absent(file: Path) -> str:
 
 
 def visible(text: str) -> str:
-    """Text of a file as a terminal may show it: what it would obey (escape sequences) and what it cannot show (half a pair of surrogates) is written out."""
+    """Text of a file as a terminal may show it: what it would obey (escape sequences) and what it
+    cannot show (half a pair of surrogates) is written out."""
     return "".join(letter if letter in "\n\t" or category(letter) not in ("Cc", "Cs") else repr(letter)[1:-1] for letter in text)

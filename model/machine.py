@@ -22,7 +22,8 @@ from thermospindle.model.structure import Body, Structure
 
 PARTS = ("stationary", "rotating")
 RACEWAY_WIDTH = 1.9
-"""Largest width of a bearing over its ball diameter where none is told and rings share a tube: 1.7 to 2.1 in series 70, 719 and miniature ones."""
+"""Largest width of a bearing over its ball diameter where none is told and rings share a tube: 1.7
+to 2.1 in series 70, 719 and miniature ones."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,9 @@ class Region:
 
 @dataclass(frozen=True)
 class Point:
-    """A measuring point; `direction` is a unit vector along an axis. `mass` (kg) is that of a sensor on it that the model is to carry, and `listens` whether there is a sensor at all, and it is not only struck.
-    `channel` and `hammer` number the sensors and the hammer points of all tests of a campaign, from 1; 0 where its place among those of its spindle does."""
+    """A measuring point; `direction` is a unit vector along an axis. `mass` (kg) is that of a sensor on it that the model
+    is to carry, and `listens` whether there is a sensor at all, and it is not only struck. `channel` and `hammer` number
+    the sensors and the hammer points of all tests of a campaign, from 1; 0 where its place among those of its spindle does."""
 
     node: int
     name: str
@@ -169,7 +171,8 @@ class Addition:
 class Build:
     """How a built spindle differs from its drawing, fitted to tests; the numbers of the spindle that holds it are the built ones.
 
-    `deviations` are relative, by name of the toleranced parameter (`model.built.tolerance`); `tests` the ids of the tests they were fitted to.
+    `deviations` are relative, by name of the toleranced parameter (`model.built.tolerance`);
+    `tests` the ids of the tests they were fitted to.
     """
 
     deviations: Mapping[str, float]
@@ -178,7 +181,8 @@ class Build:
 
 @dataclass(frozen=True)
 class RadialLoad:
-    """An external force (N) along x and y on what turns at a height `z` (m): on the `body` or shaft named, or on the one that the height tells (`model.carrier`); `key` begins the keys of the scene that tell it."""
+    """An external force (N) along x and y on what turns at a height `z` (m): on the `body` or shaft named,
+    or on the one that the height tells (`model.carrier`); `key` begins the keys of the scene that tell it."""
 
     force: tuple[float, float]
     z: float
@@ -286,7 +290,8 @@ class Spindle:
         return self.structure.body(first.inner_body if first.turning_ring == "outer" else first.outer_body)
 
     def axial_on_turning(self, force: float) -> float:
-        """`axial_load` (N) of an axial force (N) on what turns: itself where outer rings turn, its opposite where inner rings do, since bearings feel the motion between both alone."""
+        """`axial_load` (N) of an axial force (N) on what turns: itself where outer rings turn, its
+        opposite where inner rings do, since bearings feel the motion between both alone."""
         return -force if any(b.turning_ring == "inner" for b in self.bearings) else force
 
     @property
@@ -301,9 +306,9 @@ class Spindle:
     def raceway(self, ring: str, bearing: Bearing | RollerBearing) -> tuple[float, float]:
         """Heights (m) between which the raceway of `bearing` lies on its region `ring`.
 
-        The bearing's height plus and minus half its `raceway_width`, inside the region. Without a width the whole height of a region that
-        serves one bearing, and on one that several share `RACEWAY_WIDTH` ball diameters, or as much as the nearest row leaves: half of what is between them, or what its own width
-        leaves; but no less than a ball.
+        The bearing's height plus and minus half its `raceway_width`, inside the region. Without a width the whole height
+        of a region that serves one bearing, and on one that several share `RACEWAY_WIDTH` ball diameters, or as much as
+        the nearest row leaves: half of what is between them, or what its own width leaves; but no less than a ball.
         """
         region, width = self.region(ring), bearing.raceway_width
         if width is None:

@@ -1,4 +1,5 @@
-"""What a material is: laws over temperature, and an isotropic linear thermo-elastic material made of them; `model.machine` has them in a spindle."""
+"""What a material is: laws over temperature, and an isotropic linear thermo-elastic material made
+of them; `model.machine` has them in a spindle."""
 
 from __future__ import annotations
 
@@ -65,7 +66,8 @@ LEAST_VISCOSITY = 0.35e-6  # m2/s; log10 log10 (nu + 0.7 mm2/s) ends at 0.3 mm2/
 
 @dataclass(frozen=True)
 class Viscosity(Entries):
-    """Kinematic viscosity (m2/s) of an oil, at least `LEAST_VISCOSITY`: between its entries log10 log10 (nu + 0.7) is linear in log10 T, nu in mm2/s and T in K (ASTM D341)."""
+    """Kinematic viscosity (m2/s) of an oil, at least `LEAST_VISCOSITY`: between its entries log10
+    log10 (nu + 0.7) is linear in log10 T, nu in mm2/s and T in K (ASTM D341)."""
 
     @cached_property
     def _straight(self) -> list[tuple[float, float]]:

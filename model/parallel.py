@@ -98,7 +98,8 @@ def in_parallel(
 
 @contextmanager
 def keeping(keeper: Callable[[int], tuple[list[Any], Callable[[Any], object]]] | None) -> Iterator[None]:
-    """Within it every call of `in_parallel` asks `keeper`, by how many items it has, for the first results if they are known, and for what takes each further one, in order."""
+    """Within it every call of `in_parallel` asks `keeper`, by how many items it has, for the first
+    results if they are known, and for what takes each further one, in order."""
     global _keeper
     before, _keeper = _keeper, keeper
     try:
@@ -126,8 +127,8 @@ def tell(done: int, of: int) -> None:
 
 @contextmanager
 def meanwhile(function: Callable[[], Result], workers: int | None = None) -> Iterator[Callable[[], Result]]:
-    """What asks for `function()`, which a worker has begun on while much else is done here; on a single core, or within a worker, it is done when it is asked
-    for. For long work that is to be done in parallel later anyway: the workers are started with it."""
+    """What asks for `function()`, which a worker has begun on while much else is done here; on a single core, or within a worker,
+    it is done when it is asked for. For long work that is to be done in parallel later anyway: the workers are started with it."""
     workers = workers or cores()
     if workers < 2 or _inside:
         yield function
@@ -197,8 +198,8 @@ def _begin(parent: int) -> None:
 
 
 def _leave_with(parent: int) -> None:
-    """Ends this worker when the process that started it is gone, killed for instance: one that has a large result to hand over would wait for ever, since
-    it holds the other end of the pipe itself."""
+    """Ends this worker when the process that started it is gone, killed for instance: one that has a
+    large result to hand over would wait for ever, since it holds the other end of the pipe itself."""
     while os.getppid() == parent:
         time.sleep(1.0)
     os._exit(1)

@@ -22,7 +22,8 @@ COLDEST, HOTTEST = -40.0, 120.0
 FASTEST = 2.5e6
 """mm rev/min, speed times pitch diameter: what rolling bearings reach, with ceramic balls and oil-air (Abele et al., CIRP Annals 59, 2010)."""
 STRONGEST = 1e9
-"""Pa: rho v^2, the hoop stress of a thin ring by its own rotation (Timoshenko, *Strength of Materials*, part 2, 1956), that quenched steel does not bear for long."""
+"""Pa: rho v^2, the hoop stress of a thin ring by its own rotation (Timoshenko, *Strength of
+Materials*, part 2, 1956), that quenched steel does not bear for long."""
 AGAINST = 0.01  # of its preload, or of 1 N, by which a row is loaded against its sense
 OTHERWISE = 0.3
 """Of a damping ratio, by which it may be off before that is said: measured ones scatter by as much."""
@@ -62,7 +63,8 @@ def of_conditions(spindle: Spindle, conditions: Sequence[Condition]) -> list[str
 
 
 def speed_factor(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> float:
-    """n dm (mm rev/min) of a bearing: the speed of its rings against each other, where the spindle has `speed` (rad/s), times its pitch diameter."""
+    """n dm (mm rev/min) of a bearing: the speed of its rings against each other, where the spindle
+    has `speed` (rad/s), times its pitch diameter."""
     return relative_speed(spindle, b, speed) / RPM * b.pitch_diameter / MM
 
 
@@ -98,7 +100,8 @@ def of_loads(spindle: Spindle, least: Mapping[str, float]) -> list[str]:
 
 
 def of_damping(chain: RotorBase, modes: Sequence[Mode]) -> list[str]:
-    """Modes of a turning chain that would be damped otherwise if the dampers of what turns turned with it, and not stood in space as those of a chain do."""
+    """Modes of a turning chain that would be damped otherwise if the dampers of what turns turned
+    with it, and not stood in space as those of a chain do."""
     other = [(m, m.damping_ratio, turned) for m, turned in zip(modes, turned_dampings(chain, modes), strict=True)]
     undamped = [(m, turned) for m, own, turned in other if turned <= 0 < own]
     if undamped:
@@ -122,8 +125,9 @@ def of_damping(chain: RotorBase, modes: Sequence[Mode]) -> list[str]:
 def turned_dampings(chain: RotorBase, modes: Sequence[Mode]) -> list[float]:
     """Damping ratios of modes of a chain if the dampers between bodies of one rotor turned with it.
 
-    Turning with w, such a damper feels q' - w S q, S q the motion (-y, x) across and of the tilts (Genta, *Dynamics of Rotating Systems*, 2005, ch. 6): beside C it makes the
-    circulatory stiffness -w C S. To first order that moves a lightly damped mode's pole p by w phi^H C S phi / phi^H (2 p M + C + G) phi; forward modes lose w / |p| of what turns.
+    Turning with w, such a damper feels q' - w S q, S q the motion (-y, x) across and of the tilts (Genta, *Dynamics of
+    Rotating Systems*, 2005, ch. 6): beside C it makes the circulatory stiffness -w C S. To first order that moves a
+    lightly damped mode's pole p by w phi^H C S phi / phi^H (2 p M + C + G) phi; forward modes lose w / |p| of what turns.
     """
     linear = matrices(chain)
     circulatory = _circulatory(chain, linear)

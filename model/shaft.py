@@ -1,4 +1,5 @@
-"""Flexible shafts as they are drawn: plain and tapered round segments along the spindle axis, or rectangular ones, and the nodes a beam model gives them."""
+"""Flexible shafts as they are drawn: plain and tapered round segments along the spindle axis, or
+rectangular ones, and the nodes a beam model gives them."""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ THEORIES = {"euler-bernoulli": (0.0, 0.0), "rayleigh": (0.0, 1.0), "timoshenko":
 class Segment:
     """A piece of a shaft between two heights (m), its radii at both ends (m), which change evenly between them.
 
-    `outer` carries stiffness, `mass_outer` mass: a clamped-on ring is heavy and hardly stiff. A rectangular one is solid and has `sides` (m) along x and y,
-    the same at both ends; its radii are half of that along x, as it is drawn.
+    `outer` carries stiffness, `mass_outer` mass: a clamped-on ring is heavy and hardly stiff. A rectangular one is
+    solid and has `sides` (m) along x and y, the same at both ends; its radii are half of that along x, as it is drawn.
     """
 
     z: tuple[float, float]

@@ -11,9 +11,9 @@ ABSOLUTE_ZERO = -273.15  # C
 def temperature_range(spindle: Spindle, lubricant: bool = True) -> tuple[float, float]:
     """Lowest and highest temperature (C) that every law of the spindle's materials reaches, (-273.15, inf) where all are constant.
 
-    The laws are Young's modulus and thermal expansion of the materials that regions, balls and rings are made of, Young's modulus of those of shafts and joints, and the lubricant's
-    viscosity, which friction and films ask for; `lubricant` False leaves that out. A finite difference must stay inside: one-sided at
-    either end. Empty (low > high) where two laws have no temperature in common.
+    The laws are Young's modulus and thermal expansion of the materials that regions, balls and rings are made of, Young's modulus of
+    those of shafts and joints, and the lubricant's viscosity, which friction and films ask for; `lubricant` False leaves that out. A
+    finite difference must stay inside: one-sided at either end. Empty (low > high) where two laws have no temperature in common.
     """
     laws: list[Entries] = [law for name in spindle.used_materials for law in (spindle.materials[name].youngs_modulus, spindle.materials[name].thermal_expansion)]
     laws += [spindle.materials[segment.material].youngs_modulus for shaft in spindle.structure.shafts for segment in shaft.segments]

@@ -22,7 +22,8 @@ COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 
 
 def check_folder(path: Path, scene: bool = False) -> None:
-    """`BadInput` if something stands at `path` that spindle did not write, or that was changed since; or a scene, in whose place only another `scene` comes."""
+    """`BadInput` if something stands at `path` that spindle did not write, or that was changed
+    since; or a scene, in whose place only another `scene` comes."""
     path = path.resolve()
     check_not_here(path)  # before what it holds is looked at
     _refuse_foreign_now(path)
@@ -35,7 +36,8 @@ def check_folder(path: Path, scene: bool = False) -> None:
 
 @contextmanager
 def whole_folder(path: Path, scene: bool = False) -> Iterator[Path]:
-    """A temporary folder beside `path` that takes its place when the block ends well, and vanishes when it does not; `BadInput` as of `check_folder`."""
+    """A temporary folder beside `path` that takes its place when the block ends well, and vanishes
+    when it does not; `BadInput` as of `check_folder`."""
     path = path.resolve()
     check_folder(path, scene)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,5 +1,5 @@
-"""What is being done, on standard error and never on standard output: a bar in a terminal, elsewhere now and then a plain line, so that long work in a
-pipe or a job's file is told from work that hangs."""
+"""What is being done, on standard error and never on standard output: a bar in a terminal, elsewhere
+now and then a plain line, so that long work in a pipe or a job's file is told from work that hangs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ TELLS = 0.1
 
 @contextmanager
 def progress_bar(steps: int | Sequence[float]) -> Iterator[Callable[[str], None]]:
-    """A function that takes what has been done, and counts it as one of so many steps, or the next of those that take as long as told, in any unit."""
+    """A function that takes what has been done, and counts it as one of so many steps, or the next
+    of those that take as long as told, in any unit."""
     takes = [1.0] * steps if isinstance(steps, int) else list(steps)
     console = Console(stderr=True, markup=False)
     if not console.is_terminal:
@@ -52,7 +53,8 @@ def hint(words: str) -> None:
 
 
 def going_on(asked: Mapping[str, Any], *read: object) -> AbstractContextManager[None]:
-    """Within it what is computed in parallel of long work is kept as it comes: the same `asked` of a verb, of what it has `read`, goes on from where it was stopped."""
+    """Within it what is computed in parallel of long work is kept as it comes: the same `asked` of
+    a verb, of what it has `read`, goes on from where it was stopped."""
     effects = [Path(file).read_bytes() for file in asked["effect_files"]]
     options = sorted((key, repr(value)) for key, value in asked.items() if key not in ("effect_files", "out", "verbose"))
     return unfinished.going_on(packed((read, effects, options)), say)
@@ -99,7 +101,8 @@ def plain_lines(takes: Sequence[float] | None = None) -> Iterator[Callable[[str]
 
 
 def _line(seconds: float, needed: float, done: int, takes: Sequence[float] | None, last: str) -> str:
-    """What has been done after `seconds`, of which the steps that have ended `needed` so many; a step that takes longer than those foretell leaves at least what they foretell of the others."""
+    """What has been done after `seconds`, of which the steps that have ended `needed` so many; a
+    step that takes longer than those foretell leaves at least what they foretell of the others."""
     if takes is None:
         return f"{_duration(seconds)}: {visible(last)}"
     left, steps = "", len(takes)

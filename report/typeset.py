@@ -30,7 +30,8 @@ def micro(text: str) -> str:
 
 
 def prose(text: str) -> str:
-    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus, arrow, degrees and micro; what stands in backticks is code, and stays as it is typed."""
+    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus, arrow, degrees and
+    micro; what stands in backticks is code, and stays as it is typed."""
     typed = [str(escape(part)) for part in re.split(r"`([^`]+)`", text)]  # words, code, words, ...
     words = [minus(micro(re.sub(r"(?<=\d) C\b", " °C", part))).replace("+-", "±").replace("-&gt;", "→") for part in typed[::2]]
     return words[0] + "".join(f"<code>{code}</code>{after}" for code, after in zip(typed[1::2], words[1:], strict=True))
@@ -81,7 +82,8 @@ def signed_short(value: float) -> str:
 
 
 def power(watts: float) -> tuple[str, float]:
-    """The unit for powers up to so many `watts`, and how many of it a watt is: a disk drive's friction takes milliwatts, a machine tool's watts."""
+    """The unit for powers up to so many `watts`, and how many of it a watt is: a disk drive's
+    friction takes milliwatts, a machine tool's watts."""
     return ("mW", 1e3) if watts < 10 else ("W", 1.0)
 
 
@@ -96,8 +98,8 @@ def plain_error(value: float, error: float) -> str:
 def table(
     head: Sequence[str], rows: Iterable[Sequence[str]], words: Collection[int] = (0,), caption: str = "", name: str = "", ruled: bool = False
 ) -> str:
-    """A table of a page: cells are HTML, columns `words` stand to the left, numbers to the right; `ruled`: a line above each row that has a first
-    cell. `name` is its id."""
+    """A table of a page: cells are HTML, columns `words` stand to the left, numbers to the right;
+    `ruled`: a line above each row that has a first cell. `name` is its id."""
 
     def row(kind: str, cells: Sequence[str], look: str = "") -> str:
         return f"<tr{look}>" + "".join(f"<{kind}{' class=left' if k in words else ''}>{c}</{kind}>" for k, c in enumerate(cells)) + "</tr>"

@@ -43,8 +43,9 @@ from thermospindle.thermal.expansion import expand
 class OperatingPoint:
     """One spindle at one condition; what follows from it is computed when first asked.
 
-    `spindle` is the drawing as the effects of the scene leave it at this condition. `condition` is what was asked for, and that which effects make of it
-    (`thermometer_error`) the state's own. `regions` are the temperatures (C) of the section, one of all or by region, and `motions` the rings', by bearing.
+    `spindle` is the drawing as the effects of the scene leave it at this condition. `condition` is what
+    was asked for, and that which effects make of it (`thermometer_error`) the state's own. `regions` are
+    the temperatures (C) of the section, one of all or by region, and `motions` the rings', by bearing.
     """
 
     spindle: Spindle
@@ -118,7 +119,8 @@ class OperatingPoint:
     def frf(self, frequency: ArrayLike, window_decay: float = 0.0, between: Between | None = None) -> ComplexArray:
         """Exact mobility (n_resp, n_ref, n) of the linear model at `frequency` (Hz), as the measuring chain shows it.
 
-        BadInput for frequencies that are no row of numbers, zero or more. `window_decay` (1/s) is that of an exponential window that is known and still in the FRFs; with the mass `between` nodes of shafts (`mass_between`) where it is, as MuJoCo does not step it.
+        BadInput for frequencies that are no row of numbers, zero or more. `window_decay` (1/s) is that of an exponential window that is
+        known and still in the FRFs; with the mass `between` nodes of shafts (`mass_between`) where it is, as MuJoCo does not step it.
         """
         m, frequency = self.measurement, lines_of("frequency", frequency, zero=True)
         s: ComplexArray = np.asarray(frequency - 1j * (m.decay + window_decay) / (2 * np.pi), complex)
@@ -138,8 +140,8 @@ def lines_of(name: str, frequency: ArrayLike, zero: bool = False) -> Array:
 
 
 def mass_between(point: OperatingPoint, drawing: Spindle) -> Between | None:
-    """What the mass between the nodes of shafts adds at an operating point, with the drawing's materials at the reference temperature: what an effect changes of so
-    little is left out."""
+    """What the mass between the nodes of shafts adds at an operating point, with the drawing's
+    materials at the reference temperature: what an effect changes of so little is left out."""
     structure = point.spindle.structure
     if not structure.shafts:
         return None
@@ -222,7 +224,8 @@ def _region_temperatures(spindle: Spindle, condition: Condition, effects: Sequen
 
 
 def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> Spindle:
-    """The drawing at a condition's temperature, with the sensors of known mass on it, whose shafts and joints have the moduli of that temperature, as effects leave it."""
+    """The drawing at a condition's temperature, with the sensors of known mass on it, whose shafts
+    and joints have the moduli of that temperature, as effects leave it."""
     spindle = with_sensors(spindle)
     structure = at_temperature(spindle.structure, spindle.materials, spindle.reference_temperature, condition.temperature)
     spindle = spindle if structure is spindle.structure else replace(spindle, structure=structure)

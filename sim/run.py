@@ -44,7 +44,8 @@ def run(
     seed: int = 0,
     progress: Callable[[str], None] = lambda done: None,
 ) -> Run:
-    """Run the chain at every temperature (C), with the `usual` element (`sim.hammer.test`) where none is asked for; `progress` is told in words what has been done."""
+    """Run the chain at every temperature (C), with the `usual` element (`sim.hammer.test`) where
+    none is asked for; `progress` is told in words what has been done."""
     check_band(spindle.hammer, str(spindle.file or spindle.name))
     points = []
     for temperature in temperatures:

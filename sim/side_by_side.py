@@ -1,8 +1,8 @@
 """MuJoCo models stepped side by side in C, as many at a time as there are cores, each in data of its own.
 
-`mujoco.rollout` shares data between models of one size only, and does not check it: the same spindle at another temperature may have an entry more in a
-tendon, where rounding has left no exact zero, and then writes past the end of data made for its neighbour. A thread a model, each with its own
-data, costs nothing beside that: the stepping leaves Python's lock alone.
+`mujoco.rollout` shares data between models of one size only, and does not check it: the same spindle at another temperature
+may have an entry more in a tendon, where rounding has left no exact zero, and then writes past the end of data made for its
+neighbour. A thread a model, each with its own data, costs nothing beside that: the stepping leaves Python's lock alone.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class SideBySide:
     def step(self, start: Array, control: Array, spec: mujoco.mjtState = mujoco.mjtState.mjSTATE_CTRL) -> tuple[Array, Array]:
         """States (models, steps, nstate) and sensors (models, steps, nsensordata) after each step.
 
-        `start` (models, nstate) are MuJoCo's full physics states, `control` (models, steps, n) is held over each step: what `spec` says it is.
-        NotConverged where a motion grew beyond all bounds: MuJoCo itself would set such a model back to rest and go on.
+        `start` (models, nstate) are MuJoCo's full physics states, `control` (models, steps, n) is held over each step: what `spec`
+        says it is. NotConverged where a motion grew beyond all bounds: MuJoCo itself would set such a model back to rest and go on.
         """
 
         def run(k: int) -> tuple[Array, Array]:

@@ -1,9 +1,9 @@
 """Warm-up: losses heat the running spindle, its rings move, and preload, stiffness and natural frequencies drift with them.
 
-The heat equation of the section (`thermal.heat`) and the axial equilibrium of the bearings (`model.bearing.pair`) are solved together at every
-stage of every time step: Palmgren's friction depends on the lubricant's temperature and on the preload, the preload on the temperature
-of the whole section. Spin-up takes seconds and is left out: the speed stands from time zero. A chamber soak is the same with air at
-another temperature than the spindle's.
+The heat equation of the section (`thermal.heat`) and the axial equilibrium of the bearings (`model.bearing.pair`)
+are solved together at every stage of every time step: Palmgren's friction depends on the lubricant's temperature
+and on the preload, the preload on the temperature of the whole section. Spin-up takes seconds and is left out:
+the speed stands from time zero. A chamber soak is the same with air at another temperature than the spindle's.
 
 Effects of the scene act as at any operating point, with the mean temperature of the spindle (weighted with heat capacity) as the
 condition's; those that prescribe region temperatures are left out whole, since region temperatures are what is computed here.
@@ -58,11 +58,11 @@ class Moment:
 class Warmup:
     """A warm-up from `start` (C) in air of `air` (C) at `speed` (rad/s).
 
-    `moments` stand at `history.times` (s); `frequencies` (times, modes) in Hz follow the modes of the first moment by their shape, NaN
-    where one has been lost; `steady` is the end of all times, `steady_frequencies` (modes,) its modes; `time_constant` (s) of the
-    slowest decay about it. `left_out` names effects whose region temperatures are computed here instead. `feedback` is what comes back
-    in the steady state of bearing loads that are added, through the heat that they make: at 1 it would run away. Where there is no steady state, and a time was told, `unsteady` says why,
-    and the time constant is that of the loads at the start.
+    `moments` stand at `history.times` (s); `frequencies` (times, modes) in Hz follow the modes of the first moment by their shape,
+    NaN where one has been lost; `steady` is the end of all times, `steady_frequencies` (modes,) its modes; `time_constant` (s) of
+    the slowest decay about it. `left_out` names effects whose region temperatures are computed here instead. `feedback` is what
+    comes back in the steady state of bearing loads that are added, through the heat that they make: at 1 it would run away. Where
+    there is no steady state, and a time was told, `unsteady` says why, and the time constant is that of the loads at the start.
     """
 
     spindle: Spindle
@@ -107,8 +107,8 @@ def warm_up(
     """From a uniform temperature `start` (C) at `speed` (rad/s) in `air` (C, as the start by default) for `duration` (s).
 
     `duration` is `TIME_CONSTANTS` slowest decays by default; modes in the hammer's band are followed.
-    BadInput for a spindle without convection or a duration that is not positive; OutsideRange where a law does not reach within it; NotSettled
-    where preload and friction drive each other up without end.
+    BadInput for a spindle without convection or a duration that is not positive; OutsideRange where a
+    law does not reach within it; NotSettled where preload and friction drive each other up without end.
     """
     if duration is not None and not duration >= SHORTEST:
         raise BadInput(f"duration {duration:g} s: a warm-up needs a positive one, of {SHORTEST:g} s or more")
@@ -186,7 +186,8 @@ def warm_up(
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """What a warm-up came to: a time (s), nodal temperatures (nodes,) C, and there the loads P1 (N) of the friction of bearings and their state."""
+    """What a warm-up came to: a time (s), nodal temperatures (nodes,) C, and there the loads P1 (N)
+    of the friction of bearings and their state."""
 
     time: float
     nodal: Array
@@ -195,7 +196,8 @@ class Reached:
 
 
 def _ran_away(machine: _Machine, reached: Sequence[Reached], error: str) -> str:
-    """How far a warm-up came that left a law: the bearing whose load of friction has grown most since the start, or the hottest where none has, and what helps."""
+    """How far a warm-up came that left a law: the bearing whose load of friction has grown most
+    since the start, or the hottest where none has, and what helps."""
     begin, last = reached[0], reached[-1]
     after, regions = f"after {last.time / MINUTE:.3g} min", machine.read.region_means(last.nodal)
     temperatures = machine.read.model.bearing @ last.nodal
@@ -223,7 +225,8 @@ def _axially(begin: PairState, last: PairState, name: str) -> str:
 
 
 def _taken_up(state: PairState, name: str) -> str:
-    """What an inner ring warmer than the outer one does to radial clearance: none is left where groove centres lie as far apart in r as balls without load have them."""
+    """What an inner ring warmer than the outer one does to radial clearance: none is left where
+    groove centres lie as far apart in r as balls without load have them."""
     row = None if name in state.rollers else state.bearing(name).row
     used_up = state.rollers[name].clearance <= 0.0 if row is None else row.radial >= row.unloaded_distance
     return f", a difference that {'has used up its' if used_up else 'takes up'} radial clearance"

@@ -1,4 +1,5 @@
-"""`make bench`, flexible shafts: cost over elements and rows, and the same rotors beside ROSS where `ROSS_PYTHON` names a Python that has it."""
+"""`make bench`, flexible shafts: cost over elements and rows, and the same rotors beside ROSS where
+`ROSS_PYTHON` names a Python that has it."""
 
 from __future__ import annotations
 

@@ -2,9 +2,10 @@
 
     python -m tests.bench_growth [--picture FILE.png]
 
-Processor time of one core, the least of a few calls after one to warm up (a diagnosis: one call), so that other programs on the machine hardly count. Peers:
-MuJoCo's own stepping; its system identification where what that needs is installed (`bench_sysid`); CalculiX where `ccx` is on the path; ROSS where `ROSS_PYTHON`, sdypy-EMA where
-`EMA_PYTHON` names a Python that has it (`pip install sdypy-EMA`, in an environment of its own).
+Processor time of one core, the least of a few calls after one to warm up (a diagnosis: one call), so that other
+programs on the machine hardly count. Peers: MuJoCo's own stepping; its system identification where what that
+needs is installed (`bench_sysid`); CalculiX where `ccx` is on the path; ROSS where `ROSS_PYTHON`, sdypy-EMA
+where `EMA_PYTHON` names a Python that has it (`pip install sdypy-EMA`, in an environment of its own).
 """
 
 from __future__ import annotations

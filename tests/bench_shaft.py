@@ -1,9 +1,10 @@
-"""`python -m tests.bench_shaft`: two ways of a flexible shaft into MuJoCo, side by side on a free shaft of steel, 40 mm thick and 500 mm long.
+"""`python -m tests.bench_shaft`: two ways of a flexible shaft into MuJoCo, side by side on a free
+shaft of steel, 40 mm thick and 500 mm long.
 
-The program's: every node a body of its own from the world, elements as fixed tendons over shape functions (`model.rotor.mjcf`). The other: rigid
-segments, each the child of the one before, with hinges and slides that carry E I / h and k G A / h (the rigid finite element method: Wittbrodt,
-Adamiec-Wojcik & Wojciech, *Dynamics of Flexible Multibody Systems*, 2006, ch. 2). Errors are against the limit of many elements without MuJoCo; the longest step is
-that of RK4, 2.8 over the highest natural frequency.
+The program's: every node a body of its own from the world, elements as fixed tendons over shape functions (`model.rotor.mjcf`).
+The other: rigid segments, each the child of the one before, with hinges and slides that carry E I / h and k G A / h (the rigid
+finite element method: Wittbrodt, Adamiec-Wojcik & Wojciech, *Dynamics of Flexible Multibody Systems*, 2006, ch. 2). Errors are
+against the limit of many elements without MuJoCo; the longest step is that of RK4, 2.8 over the highest natural frequency.
 """
 
 from __future__ import annotations

@@ -3,12 +3,14 @@
     python -m tests.bench_study [--picture FILE.png]
     python -m tests.bench_study --cores [--draws N]      # the same study by 1 and by 2 worker processes of this machine, and nothing else
 
-The model. A study of N parts on n workers takes, with t the work of a part and s what the one process that hands out and writes needs for it,
+The model. A study of N parts on n workers takes, with t the work of a part and s what the one
+process that hands out and writes needs for it,
 
     T(n) = start + max(N s, ceil(N / n) t) + t_last,        speed-up N t / T(n),    at most t / s.
 
-`s` is the sum of Dask's scheduler and client, and of writing a part whole (a Parquet file, its folder, a rename). The simulated cluster is Dask itself, the real
-scheduler, client and writing, with threads that sleep instead of computing: a sleeping thread needs no core, so hundreds of workers fit into this machine.
+`s` is the sum of Dask's scheduler and client, and of writing a part whole (a Parquet file, its folder, a
+rename). The simulated cluster is Dask itself, the real scheduler, client and writing, with threads that
+sleep instead of computing: a sleeping thread needs no core, so hundreds of workers fit into this machine.
 """
 
 from __future__ import annotations
@@ -80,8 +82,8 @@ def share_of_a_core(seconds: float = 0.5) -> float:
 
 
 def simulated(workers: int, parts: int, seconds: float) -> tuple[float, float, float]:
-    """Wall time (s) of so many parts that sleep, on so many workers of a real scheduler, the processor time (s) that handing one out took, and the
-    share of a core that was to be had before and after."""
+    """Wall time (s) of so many parts that sleep, on so many workers of a real scheduler, the processor
+    time (s) that handing one out took, and the share of a core that was to be had before and after."""
     share = share_of_a_core()
     from distributed import LocalCluster
 
@@ -100,8 +102,8 @@ def model(workers: int, parts: int, work: float, serial: float, start: float = 0
 
 
 def on_cores(workers: int, draws: int, folder: Path) -> tuple[float, float, float]:
-    """Wall time (s) of a study by so many processes that have started and imported, the share of a core that one process got before and after, and the processor
-    time (s) of its cases done here one by one."""
+    """Wall time (s) of a study by so many processes that have started and imported, the share of a core
+    that one process got before and after, and the processor time (s) of its cases done here one by one."""
     of = small_study(folder)
     parts = range(draws // PER_PART)
     parallel.in_parallel(partial(part, of), range(2 * workers), workers)  # imports, and what is computed once

@@ -1,11 +1,12 @@
-"""One parameter of the rotor-base model fitted from one virtual impact test, twice: MuJoCo's system identification toolbox, and this program.
+"""One parameter of the rotor-base model fitted from one virtual impact test, twice: MuJoCo's system
+identification toolbox, and this program.
 
-A spindle whose parameter is `TRUE` above its drawing is hit once at each hammer node and measured with the scene's noise. Both start
-from the drawing, know everything else, and get the same records, the same band and the same noise. The toolbox simulates the records
-with trial values until the response agrees; this program estimates the FRFs and fits the parameter to their lines
-(`diagnosis.line_fit`). The toolbox has every advantage that the comparison allows: records and trial simulations come from one model with one
-step (no error of the model at all), its residuals are whitened with the noise that was put in, a compiled model comes from our own chain
-within milliseconds, and it stops at `ENOUGH`, below its standard error.
+A spindle whose parameter is `TRUE` above its drawing is hit once at each hammer node and measured with the scene's noise.
+Both start from the drawing, know everything else, and get the same records, the same band and the same noise. The toolbox
+simulates the records with trial values until the response agrees; this program estimates the FRFs and fits the parameter to
+their lines (`diagnosis.line_fit`). The toolbox has every advantage that the comparison allows: records and trial simulations
+come from one model with one step (no error of the model at all), its residuals are whitened with the noise that was put in,
+a compiled model comes from our own chain within milliseconds, and it stops at `ENOUGH`, below its standard error.
 """
 
 from __future__ import annotations

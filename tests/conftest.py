@@ -44,7 +44,8 @@ def spindle() -> Spindle:
 
 @pytest.fixture(scope="session")
 def stiffly_mounted(spindle) -> Spindle:
-    """On a mount of eight times its stiffness, by which an axial mode at 4165 Hz stays while two lateral ones of 4497 and 4499 Hz at 20 C fall below it, to 3565 and 3566 Hz at 100 C."""
+    """On a mount of eight times its stiffness, by which an axial mode at 4165 Hz stays while two
+    lateral ones of 4497 and 4499 Hz at 20 C fall below it, to 3565 and 3566 Hz at 100 C."""
     mount, *others = spindle.structure.joints
     stiff = replace(mount, stiffness=tuple(8 * k for k in mount.stiffness))
     return replace(spindle, structure=replace(spindle.structure, joints=(stiff, *others)))

@@ -2,8 +2,8 @@
 
     python -m tests.docs_made FILE ...    after making files again: notes that they are of the scene and the files as they are now
 
-Pictures of logs are taken under Xvfb, whose pointer stands in the middle of the screen: one of 7000 by 2600 has it beside the window. They come out at twice
-the size and are halved.
+Pictures of logs are taken under Xvfb, whose pointer stands in the middle of the screen: one of 7000
+by 2600 has it beside the window. They come out at twice the size and are halved.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Run by `make growth` with the Python of an environment that has sdypy-EMA (MIT licence): poles of the same FRFs, and what they took. No test runs it.
+"""Run by `make growth` with the Python of an environment that has sdypy-EMA (MIT licence): poles of
+the same FRFs, and what they took. No test runs it.
 
     python ema_side.py FRFS.npz       frequency (n,) from 0 Hz, value (responses, n), known (modes,) Hz: it is told where to look
 

@@ -25,7 +25,8 @@ SIZE = Parameter("size", "1", 0.0, 1.0, 1.0, (-9.0, 9.0), "", "")
 
 
 def mechanism(name: str, shaped: bool = False) -> Mechanism:
-    """With a shape parameter where it is `shaped`; a free form where the name starts with `~`; with a law of the data's own where it ends with an apostrophe."""
+    """With a shape parameter where it is `shaped`; a free form where the name starts with `~`; with
+    a law of the data's own where it ends with an apostrophe."""
     return Mechanism(Effect(name.rstrip("'"), "", "", (SIZE,), "", (), ""), {}, (SIZE,) * shaped, free=name.startswith("~"), own_law=name.endswith("'"))
 
 
@@ -43,7 +44,8 @@ def hypothesis(names: tuple[str, ...], ln: float, shape: float | None = None) ->
 
 
 def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: int = 20) -> Search:
-    """A search that found `gains` in ln evidence over the model without effects, as much as it is worth (`TOO_SURE`); so many mechanisms were screened."""
+    """A search that found `gains` in ln evidence over the model without effects, as much as it is
+    worth (`TOO_SURE`); so many mechanisms were screened."""
     spindle = SimpleNamespace(tolerances=SimpleNamespace(temperature=0.2))
     tests = tuple(SimpleNamespace(condition=c, count=50) for c in CONDITIONS)
     model = SimpleNamespace(parameters=(), tests=tests, numbers=Numbers((), tests, None), spindle=spindle, resonances=())

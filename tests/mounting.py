@@ -1,4 +1,5 @@
-"""Spindles of the tests mounted otherwise: another preload told at the reference, a spring behind a ring, the other ring turning, a hub with gears."""
+"""Spindles of the tests mounted otherwise: another preload told at the reference, a spring behind a
+ring, the other ring turning, a hub with gears."""
 
 from __future__ import annotations
 

@@ -2,9 +2,10 @@
 
     python -m tests.release_check [--pythons 3.11 3.12 3.13] [--short] [--tests PATH ...]
 
-Every Python gets two environments: the newest versions of the dependencies, and the least that `pyproject.toml` allows (uv's lowest-direct;
-of versions that have a wheel for that Python). One more is editable. `tests/release_smoke.py` runs in each, in an empty folder; its numbers must
-agree. With `--tests` these tests run there too, against what is installed. The source package must hold the documents and build the same wheel.
+Every Python gets two environments: the newest versions of the dependencies, and the least that `pyproject.toml`
+allows (uv's lowest-direct; of versions that have a wheel for that Python). One more is editable.
+`tests/release_smoke.py` runs in each, in an empty folder; its numbers must agree. With `--tests` these tests
+run there too, against what is installed. The source package must hold the documents and build the same wheel.
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
-"""What a new installation must do, far from any checkout: run by `tests.release_check` with the environment's own Python, in an empty folder.
+"""What a new installation must do, far from any checkout: run by `tests.release_check` with the
+environment's own Python, in an empty folder.
 
     python release_smoke.py SPINDLE [--short]
 
-Prints one JSON object: what was done, and numbers that all environments must agree on. `--short` leaves out the diagnosis, the time domain and most scenes.
+Prints one JSON object: what was done, and numbers that all environments must agree on. `--short`
+leaves out the diagnosis, the time domain and most scenes.
 """
 
 from __future__ import annotations

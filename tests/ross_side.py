@@ -1,7 +1,9 @@
-"""Run by `make bench` with the Python of an environment that has ROSS (petrobras/ross, Apache-2.0): the same rotor, its frequencies, FRF and times.
+"""Run by `make bench` with the Python of an environment that has ROSS (petrobras/ross, Apache-2.0):
+the same rotor, its frequencies, FRF and times.
 
-Reads {"lengths": m, "outer": m, "bore": m, "youngs_modulus", "poisson", "density", "bearings": [[node, N/m]], "speeds": rad/s, "frequencies": Hz}
-and writes {"import_s", "build_s", "modes_s", "modes_cpu_s" (of a second time), "modes": Hz by speed, "frf": [real, imaginary] at node 0 along x by speed}. No test runs it.
+Reads {"lengths": m, "outer": m, "bore": m, "youngs_modulus", "poisson", "density", "bearings": [[node,
+N/m]], "speeds": rad/s, "frequencies": Hz} and writes {"import_s", "build_s", "modes_s", "modes_cpu_s" (of a
+second time), "modes": Hz by speed, "frf": [real, imaginary] at node 0 along x by speed}. No test runs it.
 """
 
 import json

@@ -1,5 +1,5 @@
-"""A study on a real Dask scheduler with several worker processes: one killed, one that no longer answers, one whose network is cut and comes back with
-what it has done meanwhile; nothing lost, nothing twice. And the blind study on the same executor."""
+"""A study on a real Dask scheduler with several worker processes: one killed, one that no longer answers, one whose network
+is cut and comes back with what it has done meanwhile; nothing lost, nothing twice. And the blind study on the same executor."""
 
 import json
 import os
@@ -112,7 +112,8 @@ def studied_while(harm, file, out, address):
 
 
 def test_a_worker_cut_off_goes_on_and_delivers_again(tmp_path, capsys, monkeypatch):
-    """The connections stay up and carry nothing, as when a switch is off: the scheduler gives the worker up, another does its work, and then all that it had sent arrives."""
+    """The connections stay up and carry nothing, as when a switch is off: the scheduler gives the
+    worker up, another does its work, and then all that it had sent arrives."""
     import dask
     from distributed import Client, LocalCluster
 

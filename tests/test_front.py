@@ -47,7 +47,8 @@ def test_modes_are_those_of_the_model():
 
 @pytest.mark.parametrize("lines", [None, np.linspace(400.0, 3000.0, 2601)], ids=["default", "every 1 Hz"])
 def test_the_models_own_frfs_have_its_modes(lines):
-    """Without any noise, and no word of it: taken for exact to rounding they had five modes of eight, and others that are none; what symmetry forbids, rounding too, spoilt shapes."""
+    """Without any noise, and no word of it: taken for exact to rounding they had five modes of
+    eight, and others that are none; what symmetry forbids, rounding too, spoilt shapes."""
     point = ts.point("hdd_2003", 20)
     found = ts.modes(ts.frf(point, lines))
     own = np.array([m.frequency for m in ts.modes(point, highest_Hz=6000 if lines is None else 3000)])

@@ -70,8 +70,8 @@ def test_the_walk_sees_files():
 
 
 def test_verbs_open_without_what_only_draws() -> None:
-    """Each of these takes half a second and more to load, and is needed where a folder is written. One process opens one verb after the other:
-    what none has loaded at the end, none loads. The first, of states of equilibrium, reads no campaign."""
+    """Each of these takes half a second and more to load, and is needed where a folder is written. One process opens one verb
+    after the other: what none has loaded at the end, none loads. The first, of states of equilibrium, reads no campaign."""
     verbs = ["states", "chain", "compare", "diagnose", "ladder", "running", "starting", "workbench"]
     watched = {"matplotlib", "rerun", "scipy.stats", "scipy.signal", "pyuff"}
     program = f"import sys\nfor verb in {verbs}:\n    __import__('thermospindle.report.verbs.' + verb)\n    print(verb, *sorted({watched} & {{*sys.modules}}))"

@@ -219,8 +219,8 @@ def test_a_dependency_has_a_range_and_a_pin_within_it(required):
 
 
 def test_no_library_is_imported_without_being_required():
-    """Imports of the product, against the names that its requirements install; h5py (extra hdf5) and distributed (extra cluster) are imported where they
-    are used, pytest by its plugin."""
+    """Imports of the product, against the names that its requirements install; h5py (extra hdf5)
+    and distributed (extra cluster) are imported where they are used, pytest by its plugin."""
     modules = {"scikit-fem": "skfem", "rerun-sdk": "rerun"}
     given = {modules.get(r.name, r.name) for r in map(Requirement, PROJECT["dependencies"])}
     given |= {r.name for extra in ("hdf5", "cluster") for r in map(Requirement, PROJECT["optional-dependencies"][extra])} | {"pytest"}

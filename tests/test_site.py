@@ -1,4 +1,5 @@
-"""The documentation's site: every key has a meaning, nothing told is stale, what `--json` answers is what is told. It is built by `make docs`."""
+"""The documentation's site: every key has a meaning, nothing told is stale, what `--json` answers
+is what is told. It is built by `make docs`."""
 
 import importlib.util
 import json

@@ -77,7 +77,8 @@ def test_no_number_of_a_row_is_left_out_of_the_file(tmp_path, capsys):
 
 
 def test_modes_that_move_far_keep_their_number_by_shape(tmp_path, capsys):
-    """A mount three times as stiff lifts axial modes past rocking ones, by up to 68 %: by frequency an axial mode passed for the rocking one that it came near."""
+    """A mount three times as stiff lifts axial modes past rocking ones, by up to 68 %: by frequency
+    an axial mode passed for the rocking one that it came near."""
     text = 'title = "t"\nkind = "sweep"\nscene = "hdd_2003"\ntemperatures_C = [20]\nspeeds_rpm = [7200]\n[vary]\n'
     _, (own, stiff) = study(tmp_path, text + '"structure.joints.mount.axial_stiffness_N_per_m" = [6.7484e7, 2.02452e8]\n')
     kinds = [{n: (k, w) for n, k, w in zip(r["mode"], r["kind"], r["whirl"], strict=True) if n} for r in (own, stiff)]

@@ -105,7 +105,8 @@ def test_probability_of_being_better_is_that_of_normal_ones_and_its_error_comes_
 
 @pytest.mark.parametrize("draws", [2, 3, 5, 8, 15, 40])
 def test_of_two_alike_none_is_better_by_three_errors(draws):
-    """Of few draws that happen to lie apart the error by DeLong is nothing: one of two alike was named better in a third of all comparisons of two draws."""
+    """Of few draws that happen to lie apart the error by DeLong is nothing: one of two alike was
+    named better in a third of all comparisons of two draws."""
     rng = np.random.default_rng(draws)
     named = 0
     for _ in range(4000):

@@ -19,7 +19,8 @@ def test_sensitivities_are_those_of_a_linear_answer():
 
 
 def test_what_fits_noise_names_nothing():
-    """Thirty draws of twenty inputs that have nothing to do with the answer: without a look at draws left out, some coefficient of nearly every such regression is above 0.4."""
+    """Thirty draws of twenty inputs that have nothing to do with the answer: without a look at
+    draws left out, some coefficient of nearly every such regression is above 0.4."""
     named = largest = 0
     for seed in range(200):
         rng = np.random.default_rng(seed)
@@ -59,7 +60,8 @@ def two_sets(n, seed):
 
 
 def test_indices_are_those_of_ishigamis_function():
-    """Closed form: V1 = (1 + 0.1 pi^4/5)^2 / 2, V2 = 49/8, V13 = 0.01 pi^8 (1/18 - 1/50), the third acts through the first alone; and their errors come true."""
+    """Closed form: V1 = (1 + 0.1 pi^4/5)^2 / 2, V2 = 49/8, V13 = 0.01 pi^8 (1/18 - 1/50), the third
+    acts through the first alone; and their errors come true."""
     v1, v2, v13 = (1 + 0.1 * np.pi**4 / 5) ** 2 / 2, 49 / 8, 0.01 * np.pi**8 * (1 / 18 - 1 / 50)
     first, total = np.array([v1, v2, 0]) / (v1 + v2 + v13), np.array([v1 + v13, v2, v13]) / (v1 + v2 + v13)
     off = []

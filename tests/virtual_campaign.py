@@ -92,8 +92,8 @@ def mode_campaign(
     spindle: Spindle, conditions: Sequence[Condition], seed: int, effects: Sequence[tuple[Effect, Values]] = (), damping: bool = True,
     errors: Drawn | None = None, shapes: Sequence[int] = (), real: bool = False,
 ) -> Campaign:
-    """Tables of the modes in the hammer's band, frequencies to 1e-4 and damping ratios to 1 %, and shapes at the nodes `shapes` to 1 % of their largest
-    in either part, or the `real` one alone of which they show the most."""
+    """Tables of the modes in the hammer's band, frequencies to 1e-4 and damping ratios to 1 %, and shapes at the
+    nodes `shapes` to 1 % of their largest in either part, or the `real` one alone of which they show the most."""
     random = np.random.default_rng(2000 + seed)
     built = spindle
     for p, x in zip(toleranced(spindle), errors.build if errors else (), strict=False):

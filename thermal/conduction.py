@@ -45,8 +45,8 @@ class HeatModel:
     """Discrete heat equation over the nodes of all parts, in the order of `sections`; W, K, J, whole turns (2 pi included).
 
     `conduction`, `convection`, `exchange` (bearings and gaps) add up to K; `capacity` is C. `film` is convection's load for air
-    1 K above zero, `bath` that of coolants at their own temperatures, `motor[s]` the load of heat source s for 1 W, `bearing[b]` that of 1 W of friction in bearing b. The same
-    vector reads a bearing's temperature, the mean of its two raceway means.
+    1 K above zero, `bath` that of coolants at their own temperatures, `motor[s]` the load of heat source s for 1 W, `bearing[b]`
+    that of 1 W of friction in bearing b. The same vector reads a bearing's temperature, the mean of its two raceway means.
     """
 
     spindle: Spindle

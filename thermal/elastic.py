@@ -99,7 +99,8 @@ class Solid:
 
     @cached_property
     def element_stiffness(self) -> np.ndarray:
-        """Stiffness matrices (n, n, elements) of the n functions of every element: virtual work of the stress of one on the strain of the other."""
+        """Stiffness matrices (n, n, elements) of the n functions of every element: virtual work of
+        the stress of one on the strain of the other."""
         r = self.basis.global_coordinates()[0]
         normal = np.array([strain(of[0], r)[:3] for of in self.basis.basis])  # (n, 3, elements, points)
         shear = np.array([strain(of[0], r)[3] for of in self.basis.basis])
@@ -209,7 +210,7 @@ class Solid:
 def stiffened(gain: np.ndarray, work: np.ndarray) -> np.ndarray:
     """`Response.stiffening` from the gain (i, k) and the virtual work (i, k, m) of region m.
 
-    j . K^-1 f changes by a . (f' - K' u), a = K^-1 j and u = K^-1 f (Haug, Choi, Komkov, Design Sensitivity Analysis of Structural Systems, 1986,
-    sec. 1.2). Both K and the load of a region are in proportion to Young's moduli, and a . f is the gain.
+    j . K^-1 f changes by a . (f' - K' u), a = K^-1 j and u = K^-1 f (Haug, Choi, Komkov, Design Sensitivity Analysis of Structural
+    Systems, 1986, sec. 1.2). Both K and the load of a region are in proportion to Young's moduli, and a . f is the gain.
     """
     return gain[..., None] * np.eye(gain.shape[1]) - work

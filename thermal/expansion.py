@@ -24,9 +24,9 @@ TILES = {6: ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)), 8: ((0, 4, 7), (1, 5, 
 def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERANCE) -> dict[str, RingMotion]:
     """Motion of the rings of every bearing, by its name, from the reference temperature to `temperature`.
 
-    Balls and grooves have the mean temperature of their two rings, or of their own ring: of the whole region, also where bearings share
-    one. Where every region has the reference temperature nothing moves, and no finite elements are asked. ValueError for region temperatures
-    that do not match the spindle's regions; OutsideRange where a material law does not reach.
+    Balls and grooves have the mean temperature of their two rings, or of their own ring: of the whole region, also where
+    bearings share one. Where every region has the reference temperature nothing moves, and no finite elements are asked.
+    ValueError for region temperatures that do not match the spindle's regions; OutsideRange where a material law does not reach.
     """
     means = region_temperatures(spindle, temperature)
     moves: dict[Race, tuple[float, float]] = {}

@@ -1,8 +1,9 @@
 """Friction heat of a ball bearing by Palmgren's torque: Harris, Rolling Bearing Analysis, 4th ed. (2001), ch. 14.
 
-M0 = 1e-7 f0 (nu n)^(2/3) d_m^3 where nu n >= 2000, else 160e-7 f0 d_m^3; M1 = f1 P1 d_m; with N mm, mm, rpm of the rings against each other and mm2/s (the
-base oil's for grease). P1 = max(0.9 F_a cot alpha - 0.1 F_r, F_r) of a ball row, and the sum of the contact loads of cylindrical rollers. f0 is 2 for greased single-row angular contact; f1 = z (Fs/Cs)^y, 0.001 and 0.33 for them: a share of the static
-load rating, so far below 0.001 under a light preload.
+M0 = 1e-7 f0 (nu n)^(2/3) d_m^3 where nu n >= 2000, else 160e-7 f0 d_m^3; M1 = f1 P1 d_m; with N mm, mm, rpm of the
+rings against each other and mm2/s (the base oil's for grease). P1 = max(0.9 F_a cot alpha - 0.1 F_r, F_r) of a ball
+row, and the sum of the contact loads of cylindrical rollers. f0 is 2 for greased single-row angular contact; f1 = z
+(Fs/Cs)^y, 0.001 and 0.33 for them: a share of the static load rating, so far below 0.001 under a light preload.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from thermospindle.model.units import RPM
 
 
 def torque(friction: Friction, bearing: Bearing | RollerBearing, speed: float, temperature: float, load: float) -> float:
-    """Friction torque (N m, not negative) at `speed` (rad/s) of the rings against each other, `temperature` of the lubricant (C) and `load` P1 (N), as `loads` tells it.
+    """Friction torque (N m, not negative) at `speed` (rad/s) of the rings against each other,
+    `temperature` of the lubricant (C) and `load` P1 (N), as `loads` tells it.
 
     OutsideRange where the viscosity law does not reach. A bearing at rest gets its starting torque; it makes no heat.
     """
@@ -56,7 +58,8 @@ def loads(spindle: Spindle, state: PairState | None = None) -> dict[str, float]:
 def balanced(
     friction: Friction, bearings: Sequence[Bearing | RollerBearing], speeds: Sequence[float], loads: Mapping[str, float], cold: Array, gain: Array
 ) -> Array:
-    """Friction heat H (bearings,) in W with t = cold + gain H(t), t the temperatures (C) of the lubricant, `speeds` of the rings against each other, `gain` (bearings, bearings) in K/W.
+    """Friction heat H (bearings,) in W with t = cold + gain H(t), t the temperatures (C) of the
+    lubricant, `speeds` of the rings against each other, `gain` (bearings, bearings) in K/W.
 
     Bearing after bearing, each by bracketing: friction falls with temperature and `gain` is symmetric and positive, so this
     is a descent on a convex function. OutsideRange where the viscosity law does not reach the answer.

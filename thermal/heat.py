@@ -111,7 +111,8 @@ def steady(model: HeatModel, drive: Running) -> TemperatureField:
 
 
 def settled(model: HeatModel, drive: Callable[[np.ndarray], Running], start: float) -> TemperatureField:
-    """The steady temperature under loads that follow it, sought from a uniform `start` (C): raises as `steady`, and NotSettled where the two do not meet."""
+    """The steady temperature under loads that follow it, sought from a uniform `start` (C): raises
+    as `steady`, and NotSettled where the two do not meet."""
     if not model.cooled.any():
         raise ValueError("a spindle without convection has no steady temperature")
     nothing = np.zeros(model.film.size)
@@ -146,8 +147,8 @@ def march(
 ) -> History:
     """Temperatures from time 0 to `end` (s) by TR-BDF2 steps, each with an estimated error of at most `tolerance` (K).
 
-    Steps double or halve, so few matrices are factorised, and are at most `longest` (s); `told` hears after each what share of the time has passed. Raises NotSettled where temperature and drive find no agreement, OutsideRange
-    where the viscosity law does not reach.
+    Steps double or halve, so few matrices are factorised, and are at most `longest` (s); `told` hears after each what share of the time
+    has passed. Raises NotSettled where temperature and drive find no agreement, OutsideRange where the viscosity law does not reach.
     """
     times, nodal, heat = [0.0], [model.nodal(start)], []
     length = end / 2**14

@@ -28,8 +28,9 @@ from thermospindle.thermal.temperature import thermal_strain
 class Reading:
     """Reads nodal temperatures (nodes,) of `model`.
 
-    `means` (regions, nodes) are weights of the region means; `points` (points, nodes) of the temperature at the quadrature points of
-    the elastic solution, `region_of` (points,) their regions; `gain` (2 races, points) the motion (m) of `races` (r, z, r, ...) for a unit strain there. They hold for a spindle of the same section with the Young's moduli `moduli`.
+    `means` (regions, nodes) are weights of the region means; `points` (points, nodes) of the temperature at the quadrature
+    points of the elastic solution, `region_of` (points,) their regions; `gain` (2 races, points) the motion (m) of `races`
+    (r, z, r, ...) for a unit strain there. They hold for a spindle of the same section with the Young's moduli `moduli`.
     """
 
     model: HeatModel
@@ -52,8 +53,9 @@ class Reading:
         return dict(zip(self.regions, (self.means @ nodal).tolist(), strict=True))
 
     def motions(self, spindle: Spindle, nodal: np.ndarray) -> dict[str, RingMotion]:
-        """As `expand(spindle, field)`. `spindle` may differ from the model's in anything; where its elasticity follows the temperature, the influence is taken
-        there; where it is another at the reference temperature, which has meshes of its own, the finite elements are asked again."""
+        """As `expand(spindle, field)`. `spindle` may differ from the model's in anything; where its
+        elasticity follows the temperature, the influence is taken there; where it is another at the
+        reference temperature, which has meshes of its own, the finite elements are asked again."""
         means = {g.name: spindle.reference_temperature for g in spindle.regions} | self.region_means(nodal)
         gain = self.gain
         if elasticity(spindle, means) != self.moduli:

@@ -43,9 +43,9 @@ class Region:
 class Reduced:
     """A part on its space of n displacements.
 
-    `fields` (n, nodes, 2) span it; `stiffness` (regions, n, n) and `load` (regions, n) are those of one region after the other for a modulus
-    of 1 Pa and a unit strain, `motion` (2 races, n) the ring motions of `fields`. `error` is that at the last state, before it
-    joined the space, relative to the largest motion there; `solved` counts the whole solutions it took.
+    `fields` (n, nodes, 2) span it; `stiffness` (regions, n, n) and `load` (regions, n) are those of one region after the
+    other for a modulus of 1 Pa and a unit strain, `motion` (2 races, n) the ring motions of `fields`. `error` is that at the
+    last state, before it joined the space, relative to the largest motion there; `solved` counts the whole solutions it took.
     """
 
     section: PartMesh

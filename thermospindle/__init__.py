@@ -7,8 +7,8 @@
     for mode in ts.modes(point):
         print(mode.kind, mode.frequency)
 
-The names below are functions of `thermospindle.front` and `thermospindle.verbs`, loaded when first used: importing this package costs nothing. They take and return
-the objects that the command line uses; `thermospindle.testing` has assertions for pytest.
+The names below are functions of `thermospindle.front` and `thermospindle.verbs`, loaded when first used: importing this package
+costs nothing. They take and return the objects that the command line uses; `thermospindle.testing` has assertions for pytest.
 """
 
 from __future__ import annotations

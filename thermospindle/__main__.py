@@ -7,7 +7,8 @@ import sys
 
 
 def main() -> int:
-    """Run the verb of the command line; returns its exit code, 130 when stopped at any moment, by Ctrl-C or by who asks a process to end (`timeout`, a batch system)."""
+    """Run the verb of the command line; returns its exit code, 130 when stopped at any moment, by
+    Ctrl-C or by who asks a process to end (`timeout`, a batch system)."""
     try:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         from thermospindle.cli import main as command_line

@@ -1,4 +1,5 @@
-"""What the functions of `import thermospindle as ts` check of their arguments: `BadInput`, one sentence that names argument, value and what is allowed."""
+"""What the functions of `import thermospindle as ts` check of their arguments: `BadInput`, one
+sentence that names argument, value and what is allowed."""
 
 from __future__ import annotations
 

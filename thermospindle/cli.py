@@ -1,4 +1,5 @@
-"""The command line: `spindle VERB SCENE [options]`. It parses (`options`), calls the verb's function in `report.verbs`, prints, and nothing else.
+"""The command line: `spindle VERB SCENE [options]`. It parses (`options`), calls the verb's
+function in `report.verbs`, prints, and nothing else.
 
 Only what parsing needs is imported at the start; a verb's module, and with it the libraries that compute, when the verb is called.
 """
@@ -101,7 +102,8 @@ def _run(arguments: list[str]) -> int:
 
 @contextmanager
 def _alone_on_stdout(as_json: bool) -> Iterator[None]:
-    """Whatever is printed while a verb works, by an effect of one's own or a process that it starts, goes to standard error where one JSON object is asked for."""
+    """Whatever is printed while a verb works, by an effect of one's own or a process that it
+    starts, goes to standard error where one JSON object is asked for."""
     try:
         kept = os.dup(1) if as_json else -1
     except OSError:  # closed by the caller

@@ -71,8 +71,8 @@ def odd(*points: OperatingPoint) -> list[str]:
 
 
 def behind(first: OperatingPoint, then: OperatingPoint, index: int, after: Mode) -> list[str]:
-    """Where the energy is, and what the change of each element's stiffness does to the mode: df = f/2 phi^T dK phi / phi^T K phi, the mean of what the shapes at both ends
-    say, which is right to the second order; and what is left, of masses, speed and higher orders."""
+    """Where the energy is, and what the change of each element's stiffness does to the mode: df = f/2 phi^T dK phi / phi^T K phi, the
+    mean of what the shapes at both ends say, which is right to the second order; and what is left, of masses, speed and higher orders."""
     mode = first.modes[index]
     ends = [_moved(first, then, first, mode), _moved(first, then, then, after)]
     change = _by_part(first, {name: sum(end[name] for end in ends) / 2 for name in ends[0]})

@@ -1,8 +1,8 @@
 """The functions of `import thermospindle as ts`: one line each from a scene to its modes, FRFs, tests, comparison and diagnosis.
 
-Arguments carry the units people write in their names (C, rpm, Hz, N); what comes back is SI, with the units at its fields. Everything raises
-`BadInput`, one sentence that names file, key or argument, value and what is allowed, for what cannot be used; what can be asked and has no answer
-is `NoEquilibrium`, of bearings that find no balance.
+Arguments carry the units people write in their names (C, rpm, Hz, N); what comes back is SI, with the units at its
+fields. Everything raises `BadInput`, one sentence that names file, key or argument, value and what is allowed, for
+what cannot be used; what can be asked and has no answer is `NoEquilibrium`, of bearings that find no balance.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ LINES = 2000  # of an FRF over the scene's band, where no frequencies are given
 def load(scene: str | Path, effect_files: Sequence[str | Path] = (), *, values: Mapping[str, Any] | None = None) -> Spindle:
     """The spindle of a scene: its folder, its `spindle.toml`, or the name of a shipped one like "hdd_2003".
 
-    `effect_files` hold effects of your own that the scene has. `values` stand in for those of the file, in its units, by dotted key with entries of lists by their name:
-    {"sets.main.preload_N": 200, "effects.bond_softening.hot_compliance": 10}, as in `[vary]` of a study.
+    `effect_files` hold effects of your own that the scene has. `values` stand in for those of the file, in its units, by dotted key with
+    entries of lists by their name: {"sets.main.preload_N": 200, "effects.bond_softening.hot_compliance": 10}, as in `[vary]` of a study.
     """
     of_kind("scene", scene, (str, Path), "a scene's folder or the name of a shipped one")
     files = [Path(f) for f in several("effect_files", effect_files, "paths of files")]
@@ -74,7 +74,8 @@ def load(scene: str | Path, effect_files: Sequence[str | Path] = (), *, values: 
 def point(spindle: Spindle | str | Path, temperature_C: float, *, speed_rpm: float = 0.0) -> OperatingPoint:
     """The spindle soaked at a temperature (C) and turning (rpm): bearing states in `.state`, the compiled MuJoCo model in `.model`.
 
-    Raises `NoEquilibrium` where the bearings find no balance; warns (`UserWarning`) of a condition that no real spindle bears and of what is odd about its bearings.
+    Raises `NoEquilibrium` where the bearings find no balance; warns (`UserWarning`) of a condition
+    that no real spindle bears and of what is odd about its bearings.
     """
     found = soaked(drawing_of(spindle), temperature_C, speed_rpm)
     for doubt in odd(found):
@@ -101,10 +102,11 @@ def modes(source: ImpactTest | Frf, *, highest_Hz: float = ..., window_decay: fl
 def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.inf, window_decay: float = 0.0) -> list[Mode] | Modes:
     """Natural modes up to `highest_Hz`.
 
-    Of an operating point the model's own, a list in order of frequency: `.frequency` Hz, `.damping_ratio`, `.kind`, `.whirl`, `.energy` (share of the
-    strain energy by element), `.shape` (n,). Of an impact test or measured FRFs those identified by maximum likelihood: `Modes` with `.frequency` (m,)
-    Hz, `.damping` (m,), `.shape` (m, responses), and `.frequency_sd` (m,) and so on, their standard errors. FRFs of records under an exponential window
-    exp(-d t) have its damping in them, d / (2 pi f) more of every mode: `window_decay` (1/s) takes it out; of an impact test it is known.
+    Of an operating point the model's own, a list in order of frequency: `.frequency` Hz, `.damping_ratio`, `.kind`,
+    `.whirl`, `.energy` (share of the strain energy by element), `.shape` (n,). Of an impact test or measured FRFs those
+    identified by maximum likelihood: `Modes` with `.frequency` (m,) Hz, `.damping` (m,), `.shape` (m, responses), and
+    `.frequency_sd` (m,) and so on, their standard errors. FRFs of records under an exponential window exp(-d t) have its
+    damping in them, d / (2 pi f) more of every mode: `window_decay` (1/s) takes it out; of an impact test it is known.
     """
     of_kind("source", source, (OperatingPoint, ImpactTest, Frf), "an operating point (ts.point), a virtual test (ts.impact) or FRFs (ts.frf)")
     if highest_Hz != np.inf:
@@ -126,9 +128,10 @@ def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.i
 def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = None, *, quantity: Literal["receptance", "mobility", "accelerance"] = "mobility") -> Frf:
     """FRFs between the scene's measuring points: `frf["hub_top0", "hub_top90"]` is one of them, (n,) complex, SI.
 
-    Of an operating point exact at `frequency_Hz` (n,), by default 2000 lines over the scene's band; of an impact test the H1 estimate with coherence
-    and standard errors at its own lines, with the damping of its exponential window in it (`test.estimate.window_decay`, 1/s, which `modes` takes out). `quantity`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N; responses are all points, references the
-    hammer's.
+    Of an operating point exact at `frequency_Hz` (n,), by default 2000 lines over the scene's band; of an
+    impact test the H1 estimate with coherence and standard errors at its own lines, with the damping of its
+    exponential window in it (`test.estimate.window_decay`, 1/s, which `modes` takes out). `quantity`:
+    receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N; responses are all points, references the hammer's.
     """
     of_kind("source", source, (OperatingPoint, ImpactTest), "an operating point (ts.point) or a virtual test (ts.impact)")
     if not isinstance(quantity, str) or quantity not in POWER:
@@ -158,8 +161,9 @@ def impact(
 ) -> ImpactTest:
     """A virtual impact-hammer test in MuJoCo's time domain, half a second to some seconds of computing a hit.
 
-    `hits` on each hammer point and their peak force `level_N` are the scene's by default; `element` "ball-by-ball" takes contact laws instead of
-    linear bearings, "reduced" is computed with the modes alone. `.record` is what the analyser sampled; `ts.frf(test)` and `ts.modes(test)` follow from it.
+    `hits` on each hammer point and their peak force `level_N` are the scene's by default; `element`
+    "ball-by-ball" takes contact laws instead of linear bearings, "reduced" is computed with the modes
+    alone. `.record` is what the analyser sampled; `ts.frf(test)` and `ts.modes(test)` follow from it.
     """
     of_kind("point", point, (OperatingPoint,), "an operating point (ts.point)")
     if hits is not None:
@@ -176,13 +180,15 @@ def impact(
 
 
 def campaign(folder: str | Path) -> Campaign:
-    """A campaign of tests, measured or virtual; `spindle import` makes one of your own files. `.tests[0].frf` and `.modes` hold what was measured."""
+    """A campaign of tests, measured or virtual; `spindle import` makes one of your own files.
+    `.tests[0].frf` and `.modes` hold what was measured."""
     of_kind("folder", folder, (str, Path), "the folder of a campaign")
     return read_campaign(Path(folder))
 
 
 def compare(spindle: Spindle | str | Path, tests: Campaign | str | Path) -> Comparison:
-    """A campaign beside the scene: modes paired through all conditions with errors and standard errors; `.rms_residual` is one number for the whole."""
+    """A campaign beside the scene: modes paired through all conditions with errors and standard
+    errors; `.rms_residual` is one number for the whole."""
     from thermospindle.diagnosis.compare.compare import compare as beside
     from thermospindle.diagnosis.runout.lines import modal_tests
 
@@ -195,7 +201,8 @@ def diagnose(
     effects: Sequence[str] | None = None,
     progress: Callable[[str], None] = lambda done: None,
 ) -> Diagnosis:
-    """Which physics the scene lacks to explain a campaign: ten seconds to some minutes. `effects` names those of the catalogue to ask (all by default).
+    """Which physics the scene lacks to explain a campaign: ten seconds to some minutes. `effects`
+    names those of the catalogue to ask (all by default).
 
     `.verdict.word` is none, identified, ambiguous, two effects or unexplained.
     """
@@ -207,9 +214,9 @@ def diagnose(
 
 
 def answer(found: Diagnosis | Comparison | StiffnessTable | Warmup | ResonanceMap) -> dict[str, Any]:
-    """All that the command line tells with `--json`, as plain dicts, lists and numbers with units in their keys: of a diagnosis `verdict`, `effects`,
-    `probability`, and `candidates` with the sizes that each effect has, in every test too, and their standard errors; of a comparison, a table, a warm-up and a map likewise.
-    docs/site/answers.toml, and the site, say what every key holds.
+    """All that the command line tells with `--json`, as plain dicts, lists and numbers with units in their keys: of a diagnosis
+    `verdict`, `effects`, `probability`, and `candidates` with the sizes that each effect has, in every test too, and their standard
+    errors; of a comparison, a table, a warm-up and a map likewise. docs/site/answers.toml, and the site, say what every key holds.
     """
     for module, kind, told, function in ANSWERED:
         if isinstance(found, getattr(import_module(f"thermospindle.{module}"), kind)):
@@ -229,8 +236,8 @@ ANSWERED = (
 
 
 def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> Spindle:
-    """The spindle with an effect more, by its name in the catalogue or the `Path` of a file of your own; parameters that `values` do not name are
-    typical ones (`spindle effects NAME`).
+    """The spindle with an effect more, by its name in the catalogue or the `Path` of a file of your
+    own; parameters that `values` do not name are typical ones (`spindle effects NAME`).
 
     Nothing is written; `spindle add` writes a scene.
     """

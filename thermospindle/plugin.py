@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="session")
 def spindle() -> Spindles:
-    """Spindles and their operating points, each computed once: `spindle("hdd_2003")`, `spindle.point("hdd_2003", 60, speed_rpm=7200)`, `spindle.mode(...)`."""
+    """Spindles and their operating points, each computed once: `spindle("hdd_2003")`,
+    `spindle.point("hdd_2003", 60, speed_rpm=7200)`, `spindle.mode(...)`."""
     from thermospindle.testing import Spindles
 
     return Spindles()

@@ -5,9 +5,10 @@
     def test_the_rocking_mode_falls():
         assert_frequency_shift("hdd_2003", mode="rocking 1", from_C=20, to_C=60, shift_Hz=-20, within=2)
 
-A mode is named by kind and number: "rocking 1" is the lowest rocking mode at the condition it is named at, "axial 3" the third axial one; a whole
-number counts all modes. From one condition to another it is followed by its shape. `scene` is a folder, the name of a shipped scene, or a
-spindle (`thermospindle.load`). A scene and a condition are computed once a process. What fails says what moved, and where its energy is.
+A mode is named by kind and number: "rocking 1" is the lowest rocking mode at the condition it is named at,
+"axial 3" the third axial one; a whole number counts all modes. From one condition to another it is followed
+by its shape. `scene` is a folder, the name of a shipped scene, or a spindle (`thermospindle.load`). A scene
+and a condition are computed once a process. What fails says what moved, and where its energy is.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ def _asked(positive: Sequence[str] = (), **numbers: float) -> None:
 
 
 class Spindles:
-    """The fixture `spindle`: spindles and their operating points, each computed once; `spindle("hdd_2003")`, `spindle.point("hdd_2003", 60)`."""
+    """The fixture `spindle`: spindles and their operating points, each computed once;
+    `spindle("hdd_2003")`, `spindle.point("hdd_2003", 60)`."""
 
     def __call__(self, scene: Scene) -> Spindle:
         return _loaded(scene)
@@ -144,8 +146,9 @@ def assert_margin(
 ) -> None:
     """No line of the bearings or the unbalance comes nearer to the mode than `at_least_percent` of its frequency.
 
-    Lines in the mode's own direction count, of waviness up to `multiples` of the number of balls; at every temperature given, the ends of the
-    scene's range by default, and between two where it is on one side of the mode at the one and on the other at the other. The mode is named at the first and followed by its shape.
+    Lines in the mode's own direction count, of waviness up to `multiples` of the number of balls; at every
+    temperature given, the ends of the scene's range by default, and between two where it is on one side of the
+    mode at the one and on the other at the other. The mode is named at the first and followed by its shape.
     """
     __tracebackhide__ = True
     from thermospindle.model.bearing.kinematics import lines, row_kinematics

@@ -1,7 +1,8 @@
-"""The verbs that compute a spindle as functions of `import thermospindle as ts`: what `spindle table`, `static`, `check`, `runout`, `warmup` and `map` do.
+"""The verbs that compute a spindle as functions of `import thermospindle as ts`: what `spindle
+table`, `static`, `check`, `runout`, `warmup` and `map` do.
 
-Arguments carry the units people write in their names; what comes back is SI, with the units at its fields, and `ts.answer` makes of it what the
-command line tells with `--json`.
+Arguments carry the units people write in their names; what comes back is SI, with the units at its
+fields, and `ts.answer` makes of it what the command line tells with `--json`.
 """
 
 from __future__ import annotations
@@ -35,14 +36,15 @@ PATHS, ELEMENTS = ("simulated", "linear"), ("linear", "ball-by-ball")
 
 
 def table(spindle: Spindle | str | Path, temperatures_C: Sequence[float] | None = None, *, speeds_rpm: Sequence[float] = (0.0,)) -> StiffnessTable:
-    """Bearing stiffness over temperature, by default over the scene's range, and speed: `.values["front1"]["radial_stiffness_N_per_m"]` is (temperatures, speeds)."""
+    """Bearing stiffness over temperature, by default over the scene's range, and speed:
+    `.values["front1"]["radial_stiffness_N_per_m"]` is (temperatures, speeds)."""
     drawing = drawing_of(spindle)
     return stiffness_table(drawing, _temperatures(drawing, temperatures_C, STEPS), _speeds("speeds_rpm", speeds_rpm))
 
 
 def static(point: OperatingPoint) -> dict[str, Static]:
-    """By measuring point the answer to a unit force along its direction: `.stiffness` N/m, `.reactions` N by bearing, `.shares` of the compliance. By the bearings
-    that are computed, in the spindle's own housing."""
+    """By measuring point the answer to a unit force along its direction: `.stiffness` N/m, `.reactions` N by
+    bearing, `.shares` of the compliance. By the bearings that are computed, in the spindle's own housing."""
     of_kind("point", point, (OperatingPoint,), "an operating point (ts.point)")
     return {p.name: at_point(point.spindle, point.chain, p) for p in point.spindle.points}
 
@@ -69,8 +71,8 @@ def runout(
 ) -> Runout:
     """Runout of the turning spindle: `.values()` by probe, `.lines` with their causes, `.signals` m over time.
 
-    By the scene's imperfections, or those that `seed` draws. `path` "simulated" steps MuJoCo, "linear" is the exact harmonic answer in seconds; without one it is simulated where a record
-    can hold the steps. `seconds` are half a second or twelve turns by default.
+    By the scene's imperfections, or those that `seed` draws. `path` "simulated" steps MuJoCo, "linear" is the exact harmonic answer
+    in seconds; without one it is simulated where a record can hold the steps. `seconds` are half a second or twelve turns by default.
     """
     from thermospindle.model.built.imperfections import Imperfections
     from thermospindle.sim.running.runout import runout as of_point
@@ -99,8 +101,9 @@ def warmup(
     minutes: float | None = None,
     progress: Callable[[str], None] = lambda done: None,
 ) -> Warmup:
-    """From a uniform temperature (the reference by default) at a speed (the nominal one) in air of the same or another temperature to the steady state: `.times` s, `.moments`, `.frequencies` Hz,
-    `.steady`. Preload and friction that drive each other up without end raise `NotSettled`; with `minutes` what happens until then is computed all the same."""
+    """From a uniform temperature (the reference by default) at a speed (the nominal one) in air of the same or another
+    temperature to the steady state: `.times` s, `.moments`, `.frequencies` Hz, `.steady`. Preload and friction that
+    drive each other up without end raise `NotSettled`; with `minutes` what happens until then is computed all the same."""
     from thermospindle.sim.warmup import warm_up
 
     drawing = drawing_of(spindle)
@@ -120,7 +123,8 @@ def resonances(
     speeds_rpm: Sequence[float] | None = None,
     progress: Callable[[str], None] = lambda done: None,
 ) -> ResonanceMap:
-    """Natural frequencies against every bearing and unbalance line over temperature and speed, about a nominal condition: `.coincidences`, `.tracks`, `.lines`.
+    """Natural frequencies against every bearing and unbalance line over temperature and speed,
+    about a nominal condition: `.coincidences`, `.tracks`, `.lines`.
 
     By default the scene's range, and speeds up to twice the nominal one.
     """

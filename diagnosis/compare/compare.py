@@ -35,8 +35,8 @@ GONE = 5.0
 
 @dataclass(frozen=True)
 class PairedMode:
-    """A measured mode and the computed one behind it; damping ratios are None where not measured, `damping_sd` also where no error of one is told, `mac` where no shape
-    can be compared (`partners.shapes`).
+    """A measured mode and the computed one behind it; damping ratios are None where not measured,
+    `damping_sd` also where no error of one is told, `mac` where no shape can be compared (`partners.shapes`).
 
     `number` counts the computed modes at the coldest test at rest and follows them from there by shape. Modes closer than
     `partners.ALONE` (`close`) turn in their plane at the slightest asymmetry: their `mac` is the share of the measured shape in
@@ -76,7 +76,8 @@ class PairedMode:
 
 @dataclass(frozen=True, eq=False)
 class PairedShape:
-    """The shape that a table tells of mode `number`: measured (n,) with its errors `sd` (n,), and the computed one in its size and phase (n,), at points of the campaign."""
+    """The shape that a table tells of mode `number`: measured (n,) with its errors `sd` (n,), and
+    the computed one in its size and phase (n,), at points of the campaign."""
 
     number: int
     measured: ComplexArray
@@ -87,7 +88,8 @@ class PairedShape:
 
 @dataclass(frozen=True)
 class TestComparison:
-    """One test; `missing` measured and `extra` computed frequencies (Hz), of which those `hidden` no FRF of the test's points shows, `correlation` of its FRFs if it has any, `shapes` that its table tells of paired modes."""
+    """One test; `missing` measured and `extra` computed frequencies (Hz), of which those `hidden` no FRF of the
+    test's points shows, `correlation` of its FRFs if it has any, `shapes` that its table tells of paired modes."""
 
     __test__ = False  # not one of pytest's
 
@@ -164,7 +166,8 @@ def compare(
     progress: Callable[[str], None] = lambda done: None,
     frfs: bool = True,
 ) -> Comparison:
-    """Compare a scene, its own effects included, with a campaign; without `frfs` these are not correlated, which takes nine tenths of the time.
+    """Compare a scene, its own effects included, with a campaign; without `frfs` these are not
+    correlated, which takes nine tenths of the time.
 
     Raises `BadInput` for points on bodies the scene has not.
     """
@@ -231,8 +234,8 @@ def _repeat_variance(observed: Sequence[Observation], chosen: Sequence[Integers]
 
 
 def _first_alike(conditions: Sequence[Condition], tests: Sequence[Test]) -> list[int]:
-    """For every test the first that it is a repeat of, or itself: at one condition one of which the same else was noted; or one of which `repeat` tells another count,
-    for notes may say who measured, and when."""
+    """For every test the first that it is a repeat of, or itself: at one condition one of which the same
+    else was noted; or one of which `repeat` tells another count, for notes may say who measured, and when."""
     found: list[int] = []
     for t, (at, test) in enumerate(zip(conditions, tests, strict=True)):
         alike = [k for k in range(t) if conditions[k] == at]

@@ -1,7 +1,9 @@
-"""What of the errors is the same at all conditions: a constant error of the frequency and of the damping of every mode, which `diagnose` grants to any model and `compare` to none.
+"""What of the errors is the same at all conditions: a constant error of the frequency and of the
+damping of every mode, which `diagnose` grants to any model and `compare` to none.
 
-The residuals r of `compare` are fitted by r = -A b, b the relative errors that every mode has in all tests alike and A what they do to r (least squares; the whitened residuals know of
-the temperatures' errors). What is left is told per degree of freedom, so that offsets which take out noise alone explain nothing.
+The residuals r of `compare` are fitted by r = -A b, b the relative errors that every mode has in all tests
+alike and A what they do to r (least squares; the whitened residuals know of the temperatures' errors).
+What is left is told per degree of freedom, so that offsets which take out noise alone explain nothing.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ from thermospindle.diagnosis.compare.compare import TestComparison, rms_residual
 
 @dataclass(frozen=True)
 class Constant:
-    """`share` of the squares of all errors that constant ones explain, the rms error `without` them in standard errors, and the relative error of the frequency of each mode by its number."""
+    """`share` of the squares of all errors that constant ones explain, the rms error `without` them
+    in standard errors, and the relative error of the frequency of each mode by its number."""
 
     share: float
     without: float

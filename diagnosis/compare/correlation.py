@@ -159,8 +159,9 @@ def correlate(beside: Beside) -> Correlation | None:
 
 
 def of_sensors(tests: Sequence[Correlation]) -> dict[int, Array]:
-    """By response node, in ln, by how much measured FRFs are larger than computed ones: the median over the louder half of the lines of each FRF that the model answers, in any test,
-    as far as they stand clear of what they scatter by from line to line: noise makes small ones larger."""
+    """By response node, in ln, by how much measured FRFs are larger than computed ones: the median
+    over the louder half of the lines of each FRF that the model answers, in any test, as far as
+    they stand clear of what they scatter by from line to line: noise makes small ones larger."""
     found: dict[int, list[float]] = {}
     for c in tests:
         for (response, reference), (i, j) in c.pairs.items():
@@ -173,8 +174,9 @@ def of_sensors(tests: Sequence[Correlation]) -> dict[int, Array]:
 
 
 def off_alone(tests: Sequence[Correlation]) -> dict[int, tuple[float, float]]:
-    """Response nodes of which all FRFs are larger or smaller than computed by a factor, and by how much (relative) those of all others are at most: that stand off from the others
-    by `OFF` and by `CLEAR` times as far as all else differs. A shape (MAC), COMAC and FRAC are blind to a factor of a sensor."""
+    """Response nodes of which all FRFs are larger or smaller than computed by a factor, and by how much
+    (relative) those of all others are at most: that stand off from the others by `OFF` and by `CLEAR`
+    times as far as all else differs. A shape (MAC), COMAC and FRAC are blind to a factor of a sensor."""
     every = of_sensors(tests)
     whole = {node: float(np.median(ratios)) for node, ratios in every.items()}
     found = {}
@@ -189,8 +191,8 @@ def off_alone(tests: Sequence[Correlation]) -> dict[int, tuple[float, float]]:
 
 
 def in_common(tests: Sequence[Correlation]) -> float | None:
-    """dB by which measured FRFs are larger than computed ones, where that is much and alike in all of them: no mode tells of it, but a unit, a sensitivity or a mass would
-    make it. None where it is little, or they differ."""
+    """dB by which measured FRFs are larger than computed ones, where that is much and alike in all of them: no
+    mode tells of it, but a unit, a sensitivity or a mass would make it. None where it is little, or they differ."""
     ratios = [
         np.median(20 * np.log10(np.abs(c.measured[i, j]) / np.abs(c.computed[i, j]), where=np.abs(c.measured[i, j]) > 0, out=np.zeros(len(c.frequency))))
         for c in tests

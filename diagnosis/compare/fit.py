@@ -2,8 +2,9 @@
 
 The residuals are those of `compare` (frequencies and dampings in standard errors, with their correlations, a missing mode as an error of
 `BELIEVABLE`), over the tests that are fitted; every parameter has its prior beside them, so what the tests do not tell stays where it is
-expected. Least squares in a rectangular trust region within limits, on one of which it may begin: Voglis & Lagaris, WSEAS Int. Conf. Appl. Math. (2004); one that is scaled by
-how far limits are (Branch, Coleman, Li, *SIAM J. Sci. Comput.* 21 (1999) 1-23) leads nowhere from there. No model discrepancy is granted, and effects keep their law: for whether an effect is there at all `diagnose` is the tool.
+expected. Least squares in a rectangular trust region within limits, on one of which it may begin: Voglis & Lagaris, WSEAS Int. Conf.
+Appl. Math. (2004); one that is scaled by how far limits are (Branch, Coleman, Li, *SIAM J. Sci. Comput.* 21 (1999) 1-23) leads nowhere
+from there. No model discrepancy is granted, and effects keep their law: for whether an effect is there at all `diagnose` is the tool.
 """
 
 from __future__ import annotations

@@ -39,8 +39,8 @@ def basis(k: int, p: int = NODES) -> tuple[Array, Array, Array]:
 
 
 def divided(value: ComplexArray, sd: Array, window: Window, gaps: Sequence[int] = ()) -> list[tuple[int, int]]:
-    """Ranges of lines [first, after) whose polynomial leaves nothing but noise, from the whole band down by halves; none reaches over `gaps`, the
-    lines before which some were left out."""
+    """Ranges of lines [first, after) whose polynomial leaves nothing but noise, from the whole band
+    down by halves; none reaches over `gaps`, the lines before which some were left out."""
     n, found = value.shape[-1], []
     parts = sorted({*np.linspace(0, n, n // LONGEST + 2).astype(int).tolist(), *gaps})
     open_ranges = list(pairwise(parts))
@@ -73,8 +73,8 @@ def _lacking(squares: Array, mean: float, variance: float) -> bool:
 def compressed(
     frequency: Array, value: ComplexArray, parts: Array, blocks: list[tuple[int, int]], window: Window
 ) -> tuple[Array, ComplexArray, Array, Alike | None]:
-    """Frequencies (L,), values and standard errors (n_resp, n_ref, L), and how these go together; `parts` (parts, n_resp, n_ref, n) of the variance of lines are each by itself, but for the last of
-    two, which a window makes alike."""
+    """Frequencies (L,), values and standard errors (n_resp, n_ref, L), and how these go together; `parts` (parts,
+    n_resp, n_ref, n) of the variance of lines are each by itself, but for the last of two, which a window makes alike."""
     at, kept, mixing, variance = [], [], [], []
     for first, after in blocks:
         k, own = after - first, slice(first, after)
@@ -100,7 +100,8 @@ def compressed(
 
 
 def _between(nodes: Array, frequency: Array) -> Array:
-    """Frequencies at fractions of line numbers: straight between even lines, by a cubic spline between others, exact to 1e-9 on a logarithmic axis."""
+    """Frequencies at fractions of line numbers: straight between even lines, by a cubic spline
+    between others, exact to 1e-9 on a logarithmic axis."""
     lines = np.arange(float(len(frequency)))
     return np.asarray(np.interp(nodes, lines, frequency) if even(frequency) else CubicSpline(lines, frequency)(nodes), float)
 

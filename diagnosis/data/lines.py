@@ -1,4 +1,5 @@
-"""FRF lines of a test as the inference takes them: compressed without loss (`blocks`), with noise that their own scatter confirms (`noise`)."""
+"""FRF lines of a test as the inference takes them: compressed without loss (`blocks`), with noise
+that their own scatter confirms (`noise`)."""
 
 from __future__ import annotations
 
@@ -75,7 +76,8 @@ class LineData:
         return 1.0 if self.alike is None else self.alike.window.smooth
 
     def alone(self, rows: Array) -> Array:
-        """Rows (k, N) of independent numbers, the real and the imaginary part of one after the other, as numbers of every line by itself, taken for independent, with errors as large as those of what is smooth."""
+        """Rows (k, N) of independent numbers, the real and the imaginary part of one after the other, as
+        numbers of every line by itself, taken for independent, with errors as large as those of what is smooth."""
         if self.whitening is None:
             return rows
         values = np.ascontiguousarray(rows).view(complex).reshape(len(rows), *self.value.shape)
@@ -108,8 +110,9 @@ def _each(value: ComplexArray, by: ComplexArray) -> ComplexArray:
 
 
 def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:
-    """The lines of a test's FRFs above 0 Hz, without those of the running speed, and without those between the lines of a record that was filled up with zeros. Noise is that of the file (repeats, coherence), or `stated` by the campaign, or found in the
-    scatter of neighbouring lines, starting from what the scene's measuring chain is `expected` to have."""
+    """The lines of a test's FRFs above 0 Hz, without those of the running speed, and without those between the lines of
+    a record that was filled up with zeros. Noise is that of the file (repeats, coherence), or `stated` by the campaign,
+    or found in the scatter of neighbouring lines, starting from what the scene's measuring chain is `expected` to have."""
     assert test.frf is not None
     frf, closer = own_lines(test.frf)
     test = replace(test, frf=frf)

@@ -15,7 +15,8 @@ from thermospindle.sim.campaign.campaign import Test
 
 @dataclass(frozen=True, eq=False)
 class ModeData:
-    """Modes of one test in order of frequency (m,) Hz; `damping` is NaN and its error infinite where it was not measured; shapes are told at the test's `shape_nodes`."""
+    """Modes of one test in order of frequency (m,) Hz; `damping` is NaN and its error infinite
+    where it was not measured; shapes are told at the test's `shape_nodes`."""
 
     test: Test
     condition: Condition

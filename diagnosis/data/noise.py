@@ -1,7 +1,7 @@
 """The noise of a test's lines: that of the file, that which the campaign states, or what their own scatter tells.
 
-What the polynomials of blocks leave tells it (`blocks`), as shares of every value and of the largest. Under an exponential window neighbouring lines scatter less than
-all of it (`window`).
+What the polynomials of blocks leave tells it (`blocks`), as shares of every value and of the
+largest. Under an exponential window neighbouring lines scatter less than all of it (`window`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ CONFIRMED, PARTS = 1.1, 4  # of a known noise, up to which the scatter of neighb
 
 
 def told(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: Noise, window: Window) -> tuple[Array, str]:
-    """Standard errors (n_resp, n_ref, n) of the lines in `use` that are known, or else a first guess by what is known, and where they are from."""
+    """Standard errors (n_resp, n_ref, n) of the lines in `use` that are known, or else a first
+    guess by what is known, and where they are from."""
     if frf.sd is not None and np.all(np.isfinite(frf.sd)):
         return smooth_sd(value, frf.sd[:, :, use], frf.frequency[use]), REPEATS
     if stated is not None:
@@ -48,8 +49,9 @@ def of_neighbours(value: ComplexArray, window: Window) -> Array:
 
 
 def falls(value: ComplexArray, sd: Array, window: Window, frequency: Array) -> Array | None:
-    """Shapes (shapes, n) over frequency of a noise that falls with it, where lines at the lowest `LOW`, measured by `sd`, scatter more than twice as much as the others: that
-    of an accelerometer does, whose motion was integrated to a velocity or a displacement; None where it does not."""
+    """Shapes (shapes, n) over frequency of a noise that falls with it, where lines at the lowest
+    `LOW`, measured by `sd`, scatter more than twice as much as the others: that of an accelerometer
+    does, whose motion was integrated to a velocity or a displacement; None where it does not."""
     low = frequency <= (1 - LOW[0]) * frequency[0] + LOW[0] * frequency[-1]
     if low.sum() < LOW[1]:
         return None
@@ -59,8 +61,8 @@ def falls(value: ComplexArray, sd: Array, window: Window, frequency: Array) -> A
 
 
 def smooth_sd(value: ComplexArray, sd: Array, frequency: Array, falling: Array | None = None) -> Array:
-    """The noise of value and of largest, rising with frequency and, where given, of the shapes `falling`, that the standard errors `sd` of single lines
-    follow, FRF by FRF; few hits scatter them."""
+    """The noise of value and of largest, rising with frequency and, where given, of the shapes
+    `falling`, that the standard errors `sd` of single lines follow, FRF by FRF; few hits scatter them."""
     return np.asarray(np.sqrt(np.sum(parts_of(value, sd, frequency, falling), axis=0)))
 
 
@@ -131,11 +133,11 @@ def _error_of_first(share: Array, columns: Array, freedom: Array) -> float:
 
 
 def _gamma_fit(columns: Array, seen: Array, freedom: Array, least: tuple[float, float] = USUAL) -> Array:
-    """Shares (c,) >= 0 with `seen` (n,) about columns (n, c) @ shares: squares have errors in proportion to themselves, weighted anew. None of anything
-    where nothing was seen.
+    """Shares (c,) >= 0 with `seen` (n,) about columns (n, c) @ shares: squares have errors in
+    proportion to themselves, weighted anew. None of anything where nothing was seen.
 
-    Weights are those of `least` of the mean at least, in the first step and later, and of `TRUSTED` times less than was seen: a step that leaves a
-    block next to nothing would make it rule the following one.
+    Weights are those of `least` of the mean at least, in the first step and later, and of `TRUSTED` times
+    less than was seen: a step that leaves a block next to nothing would make it rule the following one.
     """
     if not seen.any():
         return np.zeros(columns.shape[1])

@@ -31,10 +31,10 @@ UNCERTAIN = 3e-3  # relative error of a frequency from which a pole says nothing
 class Observation:
     """Modes of one test in order of frequency; m modes, n_resp channels.
 
-    `covariance` (2m, 2m) of [ln frequency, ln damping]; damping not measured is NaN with infinite variance. `shape` (m, n_resp) and
-    `shape_sd` are relative to the largest component; `residue` (m, n_ref) is that of the receptance between each reference and the
-    channel with the largest component, `residue_sd` (m,) relative. A table of modes has no residues, shapes where it tells them, and says the
-    `kind` of each mode.
+    `covariance` (2m, 2m) of [ln frequency, ln damping]; damping not measured is NaN with infinite variance.
+    `shape` (m, n_resp) and `shape_sd` are relative to the largest component; `residue` (m, n_ref) is that of
+    the receptance between each reference and the channel with the largest component, `residue_sd` (m,)
+    relative. A table of modes has no residues, shapes where it tells them, and says the `kind` of each mode.
     """
 
     test: Test

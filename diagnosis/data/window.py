@@ -1,12 +1,14 @@
 """Noise under an exponential window: neighbouring lines are correlated, so that their scatter says less than all of it.
 
-Noise that is white in time and then multiplied by e^(-d t) has, between lines of the transform m apart, the correlation
-2 d T / (2 d T + 2 pi i m) with T the record's length (the transform of the squared window: Harris, *Proc. IEEE* 66 (1978) 51). What is smooth over
-lines is early in time, where the window has taken nothing: there the noise is up to 2 d T / (1 - e^(-2 d T)) times the lines' own variance, and
-what differs from line to line has less. FRFs of records that were hit t0 after their start have their noise turned by e^(i omega t0), with the response.
+Noise that is white in time and then multiplied by e^(-d t) has, between lines of the transform m apart, the
+correlation 2 d T / (2 d T + 2 pi i m) with T the record's length (the transform of the squared window: Harris,
+*Proc. IEEE* 66 (1978) 51). What is smooth over lines is early in time, where the window has taken nothing: there the
+noise is up to 2 d T / (1 - e^(-2 d T)) times the lines' own variance, and what differs from line to line has less.
+FRFs of records that were hit t0 after their start have their noise turned by e^(i omega t0), with the response.
 
-Lines whose errors go together are brought into independent ones, W W^H being the inverse of their correlation (Aitken, *Proc. R. Soc. Edinb.* 55 (1935) 42): taken for independent, they
-would say 2 d T times as much of all that is smooth over lines, and standard errors of a gain or a delay would be half of what they are.
+Lines whose errors go together are brought into independent ones, W W^H being the inverse of their correlation
+(Aitken, *Proc. R. Soc. Edinb.* 55 (1935) 42): taken for independent, they would say 2 d T times as much of
+all that is smooth over lines, and standard errors of a gain or a delay would be half of what they are.
 """
 
 from __future__ import annotations
@@ -56,8 +58,8 @@ NONE = Window()
 
 
 def apart(lines: Integers, window: Window, early: float = 0.0) -> ComplexArray:
-    """Correlation (n,) of the noise of two so many `lines` (n,) apart; with the last share `early` of the record as loud as its start, which may be there: where records begin
-    before the time that is told, their noise is."""
+    """Correlation (n,) of the noise of two so many `lines` (n,) apart; with the last share `early` of the record
+    as loud as its start, which may be there: where records begin before the time that is told, their noise is."""
     if window.damped == 0.0:
         return (lines == 0).astype(complex)
     falls, turns = 2 * window.damped + 2j * np.pi * lines, 2j * np.pi * np.where(lines, lines, 1)
@@ -86,8 +88,8 @@ def covariance(mixing: csr_array, number: Integers, window: Window, early: float
 
 @dataclass(frozen=True, eq=False)
 class Alike:
-    """Values (L,) of FRFs (n_resp, n_ref) that are each a `mixing` (L, n) of lines by `number` (n,), of whose variance a window makes the `share` (n_resp, n_ref, L) alike; the
-    rest is new in every line."""
+    """Values (L,) of FRFs (n_resp, n_ref) that are each a `mixing` (L, n) of lines by `number` (n,), of
+    whose variance a window makes the `share` (n_resp, n_ref, L) alike; the rest is new in every line."""
 
     mixing: csr_array
     number: Integers
@@ -102,7 +104,8 @@ class Alike:
         return replace(self, window=replace(self.window, pretrigger=pretrigger, early=TOLD))
 
     def whitening(self) -> ComplexArray:
-        """W (n_resp, n_ref, L, L), by which rows of values, each in its own standard errors, become independent ones of unit variance: W^T R W^* = 1 with R their correlation."""
+        """W (n_resp, n_ref, L, L), by which rows of values, each in its own standard errors, become
+        independent ones of unit variance: W^T R W^* = 1 with R their correlation."""
         of = self.mixing, self.number, self.window
         size, one = np.sqrt(np.diag(covariance(*of)).real), np.eye(self.mixing.shape[0])
         alike, found = covariance(*of, self.window.early) / np.outer(size, size), np.empty((*self.share.shape, len(one)), complex)
@@ -114,8 +117,8 @@ class Alike:
 
 
 def left_by(basis: Array, window: Window) -> tuple[Array, float, float]:
-    """For noise of unit variance a line and orthonormal polynomials `basis` (k, p): variances (p,) of its coefficients, and the mean and the
-    variance of the sum of squares that the polynomials leave."""
+    """For noise of unit variance a line and orthonormal polynomials `basis` (k, p): variances (p,) of
+    its coefficients, and the mean and the variance of the sum of squares that the polynomials leave."""
     k, p = basis.shape
     if window.damped == 0.0:
         return np.ones(p), float(k - p), float(k - p)
@@ -131,9 +134,11 @@ def neighbours(window: Window) -> float:
 
 
 def windowed(value: ComplexArray, window: Window) -> Window:
-    """The window that the scatter of FRFs (..., n) shows: none where noise is new in every line, and one of records that were hit later where that is not told.
+    """The window that the scatter of FRFs (..., n) shows: none where noise is new in every line,
+    and one of records that were hit later where that is not told.
 
-    From the correlation of neighbouring lines in what polynomials over short pieces leave, the median over pieces; its phase tells when records begin.
+    From the correlation of neighbouring lines in what polynomials over short pieces leave, the
+    median over pieces; its phase tells when records begin.
     """
     if window.damped < LEAST or value.shape[-1] < PIECE:
         return NONE

@@ -11,8 +11,8 @@ SPREAD = 3.0  # temperatures within so many tolerances of each other are one con
 
 
 def conditions_of(spindle: Spindle, tests: Sequence[TestData]) -> list[list[int]]:
-    """Numbers of the tests of every temperature, those within the thermometer's own scatter of the lowest together; where all are of one, of every speed,
-    level and soak time."""
+    """Numbers of the tests of every temperature, those within the thermometer's own scatter of the
+    lowest together; where all are of one, of every speed, level and soak time."""
     at = [d.condition for d in tests]
     near = SPREAD * spindle.tolerances.temperature
     groups: list[list[int]] = []

@@ -1,4 +1,5 @@
-"""What is left of every test in standard errors of its data: as drawn, fitted to all tests, and predicted from all other conditions; and whether a fit has arrived."""
+"""What is left of every test in standard errors of its data: as drawn, fitted to all tests, and
+predicted from all other conditions; and whether a fit has arrived."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ STILL_OWED = 0.1  # of chi2, up to which a fit that promises so much less has ar
 
 
 def arrived(h: Hypothesis) -> bool:
-    """Whether an explanation stands where its fit has ended: no step promised much that none found, nor is its evidence more than data without any misfit give, which
-    only the rounding of a quadratic far from its minimum makes."""
+    """Whether an explanation stands where its fit has ended: no step promised much that none found, nor is its
+    evidence more than data without any misfit give, which only the rounding of a quadratic far from its minimum makes."""
     return h.evidence.ln <= 0.0 and h.fit.owed <= max(STILL_OWED * h.fit.chi2, float(h.fit.count))
 
 
@@ -38,7 +39,8 @@ def fitted(model: CampaignModel, h: Hypothesis) -> Array:
 
 
 def predicted(model: CampaignModel, h: Hypothesis) -> Array:
-    """Rms residual (tests,) of every condition predicted from all others, that of a condition for each of its tests; not a number of a single condition."""
+    """Rms residual (tests,) of every condition predicted from all others, that of a condition for
+    each of its tests; not a number of a single condition."""
     found = np.full(len(model.tests), np.nan)
     for group in conditions_of(model.spindle, model.tests):
         found[list(group)] = left_out(model, h.fit, h.evidence, [group])[0]

@@ -1,9 +1,10 @@
 """Posterior probabilities of explanations from their evidence.
 
-Prior odds are even between nothing missing and something missing; within the catalogue every effect is as likely as another, and so is every way in which it may act (on which channel, at which bearing); two at once a quarter
-as likely as one, and something that is in no catalogue a seventh. A mechanism of the catalogue has the law assumed or one of the data's own, either
-as likely; where the law assumed does as well as any, no other was fitted, and it counts for both. A free form that changes the same as an effect that does
-as well is that effect.
+Prior odds are even between nothing missing and something missing; within the catalogue every effect is as
+likely as another, and so is every way in which it may act (on which channel, at which bearing); two at once a
+quarter as likely as one, and something that is in no catalogue a seventh. A mechanism of the catalogue has the
+law assumed or one of the data's own, either as likely; where the law assumed does as well as any, no other was
+fitted, and it counts for both. A free form that changes the same as an effect that does as well is that effect.
 """
 
 from __future__ import annotations
@@ -28,13 +29,15 @@ PRIOR = {"none": 0.5, "one": 0.32, "two": 0.08, "free": 0.05, "two free": 0.02, 
 OWN_LAW = 1.0  # prior odds of a law of the data's own over the one assumed, for an effect whose formula asks for the condition
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by judgement; others judge it
 TOO_SURE = 1.5
-"""What ln evidence is divided by in any case: any model is a little wrong, and evidence that counts every line as if it were not is too sure (the learning rate of the likelihood: Grünwald, *Algorithmic Learning Theory*,
-2012, LNCS 7568, 169, to be chosen by how well what is stated comes true). Over the 378 blind campaigns of seeds 858 to 2315, by their stored rows, the mean ln of the probability stated for the truth is -1.11 at 1, -1.06 at
-1.5 and -1.05 at 2 and 2.5; the mean of the stated loss is 1.12, 1.11, 1.13 and 1.14. Others judge it."""
+"""What ln evidence is divided by in any case: any model is a little wrong, and evidence that counts every line as if it were not is too
+sure (the learning rate of the likelihood: Grünwald, *Algorithmic Learning Theory*, 2012, LNCS 7568, 169, to be chosen by how well what
+is stated comes true). Over the 378 blind campaigns of seeds 858 to 2315, by their stored rows, the mean ln of the probability stated for
+the truth is -1.11 at 1, -1.06 at 1.5 and -1.05 at 2 and 2.5; the mean of the stated loss is 1.12, 1.11, 1.13 and 1.14. Others judge it."""
 
 ACTS_OTHERWISE = 0.01
-"""Of what an effect gains in ln evidence, up to which another beside it may be what the first does a tenth otherwise than the model says. Over 1053 blind campaigns, by their stored rows, the mean stated loss is 1.176 without
-it and 1.162, 1.153, 1.161 at 0.005, 0.01 and 0.02, wrong second names are 11 and 7; chosen on these, others judge it."""
+"""Of what an effect gains in ln evidence, up to which another beside it may be what the first does a tenth otherwise
+than the model says. Over 1053 blind campaigns, by their stored rows, the mean stated loss is 1.176 without it and
+1.162, 1.153, 1.161 at 0.005, 0.01 and 0.02, wrong second names are 11 and 7; chosen on these, others judge it."""
 
 Names = tuple[str, ...]
 Weighed = tuple[Hypothesis, float]  # and its ln weight
@@ -42,9 +45,10 @@ Weighed = tuple[Hypothesis, float]  # and its ln weight
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An explanation of the catalogue, or a free form: ln evidence over the model without effects and posterior probability. Effects that were fitted with
-    several laws, or acting in several ways, are one; `hypothesis` is the likeliest of these and `by_law` the one with the laws assumed, where there is one. `ways` are all with the laws
-    of the one that is `told`, and the share of each in their probability."""
+    """An explanation of the catalogue, or a free form: ln evidence over the model without effects and
+    posterior probability. Effects that were fitted with several laws, or acting in several ways, are one;
+    `hypothesis` is the likeliest of these and `by_law` the one with the laws assumed, where there is one.
+    `ways` are all with the laws of the one that is `told`, and the share of each in their probability."""
 
     hypothesis: Hypothesis
     names: Names
@@ -69,8 +73,8 @@ class Candidate:
 
 
 def with_unknown(found: Search) -> Search:
-    """Effects at sizes that they cannot have as free forms, where something is missing, and they explain more than all that can be: something else then changes
-    what they do. Where what can be explains no more than nothing, they gain by what is wrong with the model."""
+    """Effects at sizes that they cannot have as free forms, where something is missing, and they explain more than all that can be:
+    something else then changes what they do. Where what can be explains no more than nothing, they gain by what is wrong with the model."""
     most = max((h.evidence.ln for h in found.hypotheses if h.mechanisms and _can_be(h)), default=-np.inf)
     if most < found.base.evidence.ln + PLENTY:
         return found
@@ -87,8 +91,8 @@ def _as_unknown(h: Hypothesis) -> Hypothesis:
 
 
 def explanations(found: Search, same: Overlap) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
-    """Explanations of the catalogue and free ones, with the most probable first, and the probability of nothing missing, where the best leaves residuals
-    that say the `same`."""
+    """Explanations of the catalogue and free ones, with the most probable first, and the
+    probability of nothing missing, where the best leaves residuals that say the `same`."""
     free_count, named_count = (
         len({s.mechanism.name for s in found.screened if s.mechanism.free == free and s.visibility > 0}) or 1 for free in (True, False)
     )
@@ -127,10 +131,12 @@ def discount(best: Hypothesis, same: Overlap) -> float:
 def coarsening(best: Hypothesis, same: Overlap) -> float:
     """What ln evidence is divided by where what the best explanation leaves shows the model to be wrong: `COARSE`, or one.
 
-    Residuals that are too large, or say the same in one test as in another, a drawing beyond its tolerances, and several effects of which none
-    has its law tell of something that is not in the model, and evidence that counts lines as if nothing were missing is too sure (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened
-    posterior is a power of the likelihood). Residuals no larger than stated that say the same over lines of one test are noise that a window or a leak has spread over them, of which there is less: `Overlap.inflation`
-    counts that. Constant errors of modes that are learned are in the model, with what they make wrong in an effect (`ACTION`).
+    Residuals that are too large, or say the same in one test as in another, a drawing beyond its tolerances, and
+    several effects of which none has its law tell of something that is not in the model, and evidence that counts lines
+    as if nothing were missing is too sure (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened
+    posterior is a power of the likelihood). Residuals no larger than stated that say the same over lines of one test
+    are noise that a window or a leak has spread over them, of which there is less: `Overlap.inflation` counts that.
+    Constant errors of modes that are learned are in the model, with what they make wrong in an effect (`ACTION`).
     """
     learned = best.evidence.learned
     lawless = len(best.mechanisms) > 1 and not best.free and min(learned.departures) >= DEPARTS
@@ -139,9 +145,11 @@ def coarsening(best: Hypothesis, same: Overlap) -> float:
 
 
 def _weighed(h: Hypothesis, every: Sequence[Hypothesis], coarse: float) -> float:
-    """ln evidence, of which what one mechanism more gains counts a `coarse`-th as far as the best explanation without it, and every other that does as well, gains as
-    much by laws that are not its effects' own: what is wrong in a law looks like a little of something else. So does what is wrong in what an effect does (`ACTS_OTHERWISE`). Not like what lasts by what it is, a mass: that is the same wherever the law gives more or less. What was
-    chosen to last, as a preload that was lost at assembly, is like what the drawing may be off by."""
+    """ln evidence, of which what one mechanism more gains counts a `coarse`-th as far as the best explanation
+    without it, and every other that does as well, gains as much by laws that are not its effects' own: what is
+    wrong in a law looks like a little of something else. So does what is wrong in what an effect does
+    (`ACTS_OTHERWISE`). Not like what lasts by what it is, a mass: that is the same wherever the law gives more or
+    less. What was chosen to last, as a preload that was lost at assembly, is like what the drawing may be off by."""
     parts = [o for o in every if o.mechanisms and set(o.names) < set(h.names)]
     if not parts:
         return h.evidence.ln
@@ -161,8 +169,8 @@ def _doing_as_well(lead: Hypothesis, more: Collection[str], every: Sequence[Hypo
 
 
 def _by_other_laws(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
-    """What of its ln evidence an explanation gains by departures from laws, and by laws of the data's own over those assumed: all of it where no fit with
-    these arrived, and where something free in it follows none."""
+    """What of its ln evidence an explanation gains by departures from laws, and by laws of the data's own over
+    those assumed: all of it where no fit with these arrived, and where something free in it follows none."""
     assumed = [o for o in every if set(o.names) == set(h.names) and not any(map(_lawless, o.mechanisms, o.evidence.learned.departures))]
     return h.evidence.ln - max((o.evidence.ln - o.evidence.by_departing for o in assumed), default=-np.inf)
 
@@ -172,16 +180,17 @@ def _lawless(m: Mechanism, departs: float) -> bool:
 
 
 def _can_be(h: Hypothesis) -> bool:
-    """Whether it is weighed: a law of the data's own may be any, but of no size that the effect cannot have; and what would have to be of the opposite sign in
-    every test is not there, whatever it gains."""
+    """Whether it is weighed: a law of the data's own may be any, but of no size that the effect cannot
+    have; and what would have to be of the opposite sign in every test is not there, whatever it gains."""
     rows = [row for row in zip(h.mechanisms, h.evidence.sizes, h.evidence.as_shaped, strict=True) if not row[0].beyond]
     return not ((any(m.own_law for m, *_ in rows) and beyond_limits(h)) or any(opposite(*row) for row in rows))
 
 
 def _named_as(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, frozenset[str]], by: float) -> list[Hypothesis]:
-    """The explanations of the catalogue that an explanation with free forms is: those whose effects change the same beside the same others, and do as well. They do where they are behind by no more than
-    a `LITTLE` of ln evidence; or where no more than `CANNOT` standard errors of the data, and of what is known of their shapes, tell the two apart: the price of sizes and shapes that an effect
-    has, and a free form has not, says nothing of whether something else acts. ln evidence is divided `by` what it is worth."""
+    """The explanations of the catalogue that an explanation with free forms is: those whose effects change the same beside the same
+    others, and do as well. They do where they are behind by no more than a `LITTLE` of ln evidence; or where no more than `CANNOT`
+    standard errors of the data, and of what is known of their shapes, tell the two apart: the price of sizes and shapes that an
+    effect has, and a free form has not, says nothing of whether something else acts. ln evidence is divided `by` what it is worth."""
     means = [alike.get(m.name, frozenset()) if m.free else {m.name} for m in h.mechanisms]
 
     def same(names: Names) -> bool:
@@ -195,7 +204,8 @@ def _named_as(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, fr
 
 
 def _with_twins(rows: Sequence[Weighed], named_as: Mapping[Hypothesis, Sequence[Hypothesis]]) -> list[Weighed]:
-    """ln evidence of explanations, without those that are others of the catalogue: the best of these has theirs, and what it gains so have all that it was among."""
+    """ln evidence of explanations, without those that are others of the catalogue: the best of
+    these has theirs, and what it gains so have all that it was among."""
     values, raised = dict(rows), dict[Hypothesis, float]()
     for h, own in named_as.items():
         ahead = values[h] - max(values[o] for o in own)
@@ -204,8 +214,9 @@ def _with_twins(rows: Sequence[Weighed], named_as: Mapping[Hypothesis, Sequence[
 
 
 def _by_change(rows: Sequence[Weighed], alike: Mapping[str, frozenset[str]], coarse: float) -> list[Weighed]:
-    """ln evidence, of which explanations that change the same have what they are behind the best of the catalogue among them divided by `coarse`: between these
-    the law alone tells, and no effect's law is known so well that data which depart from all of them tell whose they are."""
+    """ln evidence, of which explanations that change the same have what they are behind the best of
+    the catalogue among them divided by `coarse`: between these the law alone tells, and no effect's
+    law is known so well that data which depart from all of them tell whose they are."""
     of_names = {_known_as(h): (h, w) for h, w in sorted(rows, key=lambda row: row[1])}  # the best with these
     raised = {}
     for names, (h, w) in of_names.items():
@@ -252,7 +263,8 @@ def _candidate(rows: Sequence[Weighed], base: float, total: float) -> Candidate:
 
 
 def _ways(found: Search) -> dict[tuple[str, str], int]:
-    """In how many ways each mechanism, with one kind of law, may act and show: of what an effect has to choose from (a channel, a bearing) one was fitted."""
+    """In how many ways each mechanism, with one kind of law, may act and show: of what an effect
+    has to choose from (a channel, a bearing) one was fitted."""
     seen: dict[tuple[str, str], set] = {}
     for s in found.screened:
         if s.visibility > 0:
@@ -261,8 +273,8 @@ def _ways(found: Search) -> dict[tuple[str, str], int]:
 
 
 def _prior(h: Hypothesis, named: int, free: int, either: Collection[str], ways: Mapping[tuple[str, str], int]) -> float:
-    """ln prior probability of one hypothesis: its kind's, shared out evenly, of effects of which `either` law was fitted that of the one they have, and of each
-    mechanism that of the way in which it acts."""
+    """ln prior probability of one hypothesis: its kind's, shared out evenly, of effects of which `either`
+    law was fitted that of the one they have, and of each mechanism that of the way in which it acts."""
     frees = sum(m.free for m in h.mechanisms)
     count = len(h.mechanisms)
     if count == 0:

@@ -1,9 +1,9 @@
 """The answer with the least expected loss.
 
-In units of a set that holds the truth: a wrong name costs ten times as much and a false alarm twenty times; to say "nothing" of a spindle that lacks
-something five times, as much as a set without the truth in it does beyond its own cost; and as much as such a set to say that something else is missing where it
-is an effect of the catalogue. Where effects act and something unknown beside them, an answer costs more by what it leaves unsaid: half a set by the smaller of the two, three sets by
-the larger.
+In units of a set that holds the truth: a wrong name costs ten times as much and a false alarm twenty times; to say "nothing" of
+a spindle that lacks something five times, as much as a set without the truth in it does beyond its own cost; and as much as
+such a set to say that something else is missing where it is an effect of the catalogue. Where effects act and something unknown
+beside them, an answer costs more by what it leaves unsaid: half a set by the smaller of the two, three sets by the larger.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def least_loss(
         return sum(c.probability * (HALF if any(own & alike.get(n, frozenset()) for n in c.names) else at_worst) for c in unknown)
 
     def named_loss(own: set[str]) -> float:
-        """Of naming one effect, or two: half right where one of two is named, or one beside something unknown; wrong with any name that is not true."""
+        """Of naming one effect, or two: half right where one of two is named, or one beside
+        something unknown; wrong with any name that is not true."""
         loss = FALSE_ALARM * none + missed(own, WRONG)
         for c in (*candidates, *beside):
             of_it = set(named_part(c))
@@ -72,14 +73,15 @@ def least_loss(
 
 
 def in_all(effects: Sequence[str], explanations: Sequence[tuple[Sequence[str], float]]) -> Names:
-    """Those of a set of `effects`, but not all, that its explanations hold, names and probability of each, but for so little that a set could be told without
-    it."""
+    """Those of a set of `effects`, but not all, that its explanations hold, names and probability
+    of each, but for so little that a set could be told without it."""
     own = [(names, p) for names, p in explanations if set(names) <= set(effects)]
     found = tuple(e for e in effects if sum(p for names, p in own if e in names) > ENOUGH * sum(p for _, p in own))
     return found if len(found) < len(effects) else ()
 
 
 def mostly_named(c: Candidate, alone: Mapping[frozenset[str], float]) -> bool:
-    """Whether the effects of the catalogue, by themselves or some of them, reach most of what an explanation gains with free drift beside them."""
+    """Whether the effects of the catalogue, by themselves or some of them, reach most of what an
+    explanation gains with free drift beside them."""
     own = frozenset(named_part(c))
     return max((gain for names, gain in alone.items() if names <= own), default=float("-inf")) > MOSTLY * c.delta_evidence

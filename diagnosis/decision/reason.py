@@ -147,7 +147,8 @@ def _moves(model: CampaignModel, r: Resonance) -> str:
 
 
 def of_tolerances(model: CampaignModel, best: Hypothesis, explained: bool = True) -> str:
-    """What of the drawing is off by more than the scene's tolerances, where these are taken wider than stated; where the data are not `explained`, that may be something else."""
+    """What of the drawing is off by more than the scene's tolerances, where these are taken wider
+    than stated; where the data are not `explained`, that may be something else."""
     times = best.evidence.learned.sizes.get(kinds_of.BUILD, 1.0)
     if times == 1.0:
         return ""
@@ -160,7 +161,8 @@ def of_tolerances(model: CampaignModel, best: Hypothesis, explained: bool = True
 
 
 def unbuilt(model: CampaignModel, h: Hypothesis) -> list[tuple[str, float]]:
-    """What an explanation has at the least or the most that is taken for possible, a tenth or eleven times of what is drawn: names and relative deviations."""
+    """What an explanation has at the least or the most that is taken for possible, a tenth or
+    eleven times of what is drawn: names and relative deviations."""
     build = [(q.name, q.at(float(m))) for m, q in zip(h.evidence.mean, model.parameters, strict=False) if q.kind == kinds_of.BUILD]
     return [(name, value) for name, value in build if not LEAST < value < MOST]
 
@@ -183,8 +185,9 @@ def of_conventions(model: CampaignModel, best: Hypothesis) -> str:
 
 
 def drifts(model: CampaignModel, h: Hypothesis) -> list[tuple[float, str]]:
-    """By how much of what modes drift from test to test, where that is more than two honest programs differ by. What is off by as much in every test does not drift: a constant error is one of every two modes too, and
-    that of one or two modes alone is had for less as drift of these."""
+    """By how much of what modes drift from test to test, where that is more than two honest
+    programs differ by. What is off by as much in every test does not drift: a constant error is one
+    of every two modes too, and that of one or two modes alone is had for less as drift of these."""
     found = []
     for kind, least, what in ((kinds_of.STIFFNESS_DRIFT, NUMERICS[0], "frequency"), (kinds_of.DAMPING_DRIFT, NUMERICS[1], "damping")):
         size = h.evidence.learned.sizes.get(kind, 0.0)

@@ -1,4 +1,5 @@
-"""From the evidence of all hypotheses to a verdict: posterior probabilities, what is no answer whatever they are, and the least expected loss."""
+"""From the evidence of all hypotheses to a verdict: posterior probabilities, what is no answer
+whatever they are, and the least expected loss."""
 
 from __future__ import annotations
 
@@ -34,10 +35,11 @@ SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is l
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """`word` is none, identified, ambiguous, two effects or unexplained; `effects` what it names; `losses` the expected loss of every answer
-    weighed. `candidates` of the catalogue, each also with a little free drift beside it, and `free` ones with the most probable first. `held_out_before` and `held_out_after` are rms residuals, in standard
-    errors, of conditions predicted from all others, without effects and as `accepted`; `held_out_gain` what their ln probability density gains. `told` is what says how
-    far drawing, thermometers and sensors are off: as `accepted`, or the likeliest where nothing is, for without what drifts these stand in for it."""
+    """`word` is none, identified, ambiguous, two effects or unexplained; `effects` what it names; `losses` the expected loss of every
+    answer weighed. `candidates` of the catalogue, each also with a little free drift beside it, and `free` ones with the most probable
+    first. `held_out_before` and `held_out_after` are rms residuals, in standard errors, of conditions predicted from all others,
+    without effects and as `accepted`; `held_out_gain` what their ln probability density gains. `told` is what says how far drawing,
+    thermometers and sensors are off: as `accepted`, or the likeliest where nothing is, for without what drifts these stand in for it."""
 
     word: str
     effects: Names
@@ -82,9 +84,10 @@ def decide(found: Search) -> Verdict:
 def _unheld(
     found: Search, best: Hypothesis, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
-    """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where a light resonance moves with temperature (and what gains little beside it), modes drift by more than two honest
-    programs differ by, the data are missed grossly, something would have to be built as nothing is, or much is left that is not alike in all tests; effects, where they leave much of what changes, or miss it grossly; and drifts that
-    miss the data grossly."""
+    """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where a light
+    resonance moves with temperature (and what gains little beside it), modes drift by more than two honest programs differ
+    by, the data are missed grossly, something would have to be built as nothing is, or much is left that is not alike in
+    all tests; effects, where they leave much of what changes, or miss it grossly; and drifts that miss the data grossly."""
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
@@ -114,7 +117,8 @@ def changing(h: Hypothesis, same: Overlap) -> float:
 
 
 def _with_drift_beside(candidates: Sequence[Candidate], free: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
-    """Probabilities as they are told: what is most of an explanation in which something drifts a little beside it has that explanation's, too."""
+    """Probabilities as they are told: what is most of an explanation in which something drifts a
+    little beside it has that explanation's, too."""
     alone = {frozenset(c.names): c.delta_evidence for c in candidates}
     beside = [c for c in free if frozenset(named_part(c)) in alone and mostly_named(c, alone)]
 
@@ -127,7 +131,8 @@ def _with_drift_beside(candidates: Sequence[Candidate], free: Sequence[Candidate
 
 
 def _accepted(found: Search, word: str, effects: Names, candidates: Sequence[Candidate], free: Sequence[Candidate]) -> Hypothesis:
-    """The hypothesis by which errors after the verdict are told: the likeliest that holds all that it names, or of a set the likeliest in it."""
+    """The hypothesis by which errors after the verdict are told: the likeliest that holds all that
+    it names, or of a set the likeliest in it."""
     if word in ("none", "unexplained"):
         return found.base
     if word == "ambiguous":

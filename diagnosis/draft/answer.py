@@ -23,8 +23,8 @@ Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 
 
 class Acting(BaseModel):
-    """An effect of the catalogue, whose size has a law of the data's own: the condition at which it acts as its formula has it (none: the test's), and its
-    other values."""
+    """An effect of the catalogue, whose size has a law of the data's own: the condition at which it
+    acts as its formula has it (none: the test's), and its other values."""
 
     at: dict[str, Number] | None = None
     values: dict[str, Number]
@@ -84,9 +84,9 @@ class Place(BaseModel):
 
 
 def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[str, ...], bool]:
-    """The first that would have to drift, or `element`, the reference temperature (C) of the scene, the effects that the verdict names, without which that would drift, and whether the build tolerances
-    of the answer are those fitted beside it. Raises `BadInput` where the file holds none, one that
-    changes by nothing, or a name that cannot stand in a Python file."""
+    """The first that would have to drift, or `element`, the reference temperature (C) of the scene, the effects that the
+    verdict names, without which that would drift, and whether the build tolerances of the answer are those fitted beside it.
+    Raises `BadInput` where the file holds none, one that changes by nothing, or a name that cannot stand in a Python file."""
     what = "elements that drift in `where`"
     told = read_raw(diagnosis, str(diagnosis), what)
     with told_by(str(diagnosis), what):

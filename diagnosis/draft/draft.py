@@ -17,8 +17,8 @@ NEAR = 10.0  # criterion within which rivals are named in the file
 
 @dataclass(frozen=True)
 class Draft:
-    """The text of an effect file, of which element it is, how well its law fits in a sentence, and whether that leaves it in `doubt`; the effects that the diagnosis named instead, and whether
-    the build tolerances of its answer go with the draft."""
+    """The text of an effect file, of which element it is, how well its law fits in a sentence, and whether that leaves it in
+    `doubt`; the effects that the diagnosis named instead, and whether the build tolerances of its answer go with the draft."""
 
     text: str
     element: str
@@ -31,7 +31,8 @@ class Draft:
 def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
     """An effect file called `name` from the free-form answer in an answer of `spindle diagnose --json`.
 
-    The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none, or one that changes by nothing.
+    The first element that would have to drift is taken, or `element`. Raises `BadInput` where the
+    file holds none, or one that changes by nothing.
     """
     place, reference, named, with_build = place_of(diagnosis, element)
     temperature, speed = place.of_tests("temperature_C"), np.abs(place.of_tests("speed_rpm"))

@@ -1,8 +1,10 @@
 """The simple laws that physics has over temperature T and speed n, and how each fits what drifts.
 
-None, linear, linear beyond a temperature, power, exponential (that grows, or saturates), Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there
-everywhere beside it, weighted by the covariance over the tests; the Bayesian information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with
-as many parameters as it has temperatures, speeds, or pairs of these fits whatever changes over them: it is taken where chi2 rules all others out, and the file says that it is not tested.
+None, linear, linear beyond a temperature, power, exponential (that grows, or saturates), Arrhenius, sigmoid, step;
+and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there everywhere
+beside it, weighted by the covariance over the tests; the Bayesian information criterion chooses (Schwarz, *Ann.
+Statist.* 6 (1978) 461). A law with as many parameters as it has temperatures, speeds, or pairs of these fits
+whatever changes over them: it is taken where chi2 rules all others out, and the file says that it is not tested.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ KELVIN = 273.15
 
 @dataclass(frozen=True)
 class Law:
-    """A law size (g(T, n; shape) + offset): the Python expression of g, the shape parameters with unit, start and limits, and whether it has an offset.
+    """A law size (g(T, n; shape) + offset): the Python expression of g, the shape parameters with
+    unit, start and limits, and whether it has an offset.
 
     The offset is counted in sizes: an effect of no size is none at all, also of a law that has one.
     """
@@ -55,7 +58,8 @@ class Law:
 
 
 def of_temperature(reference: float, hottest: float) -> tuple[Law, ...]:
-    """Laws that count temperature from a scene's reference (C); the steep ones are 1 at the hottest test (C), so that their sizes are what was seen there."""
+    """Laws that count temperature from a scene's reference (C); the steep ones are 1 at the hottest
+    test (C), so that their sizes are what was seen there."""
     from_reference, from_hottest = _less(reference), _less(hottest)
     cold, hot = f"{reference + KELVIN:.8g}", f"{hottest + KELVIN:.8g}"
     exponential, arrhenius = f"exp(({reference - hottest:.6g}) / scale)", f"exp(activation * (1 / {hot} - 1 / {cold}))"
@@ -88,7 +92,8 @@ OF_SPEED = (Law("linear in speed", "n"), Law("power of speed", "n ** power", (PO
 
 
 def laws(temperature: Array, share: Array, reference: float = REFERENCE) -> list[Law]:
-    """The laws that tests at temperatures (n,) C and shares (n,) of the highest speed can tell; temperature counts from the `reference` (C)."""
+    """The laws that tests at temperatures (n,) C and shares (n,) of the highest speed can tell;
+    temperature counts from the `reference` (C)."""
     found = [Law("constant", "1.0")]
     hottest = float(temperature.max() if abs(temperature.max() - reference) > 1 else temperature.min())  # a law from the reference is nothing there
     thermal = of_temperature(reference, hottest) if np.ptp(temperature) > 1 else ()
@@ -103,8 +108,8 @@ def laws(temperature: Array, share: Array, reference: float = REFERENCE) -> list
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A law fitted: `size`, `offset` (in sizes; 0 of a law without) and shape values with standard errors; chi2 in how many `tests`, in which what it depends on has so many different `places`, and
-    the number of parameters."""
+    """A law fitted: `size`, `offset` (in sizes; 0 of a law without) and shape values with standard errors; chi2
+    in how many `tests`, in which what it depends on has so many different `places`, and the number of parameters."""
 
     law: Law
     values: Array  # size, offset, shape...
@@ -131,8 +136,8 @@ class Fitted:
 
 
 def fit_law(law: Law, temperature: Array, share: Array, change: Array, white: Array) -> Fitted | None:
-    """Least squares in size, size times offset and shape, the first two linear; None where there are more parameters than tests, or no size is best.
-    `white` (n, n) makes errors of `change` (n,) independent and of unit variance."""
+    """Least squares in size, size times offset and shape, the first two linear; None where there are more parameters
+    than tests, or no size is best. `white` (n, n) makes errors of `change` (n,) independent and of unit variance."""
     offset = law.has_offset
     count = 1 + offset + len(law.shape)
     places = len(np.unique(np.stack([temperature * law.asks[0], share * law.asks[1]]), axis=1).T)
@@ -160,7 +165,8 @@ def fit_law(law: Law, temperature: Array, share: Array, change: Array, white: Ar
 
 
 def ranked(found: Sequence[Fitted]) -> list[Fitted]:
-    """By the criterion, the best first; laws with as many parameters as tests, which fit whatever the tests are, only where all others are refuted."""
+    """By the criterion, the best first; laws with as many parameters as tests, which fit whatever
+    the tests are, only where all others are refuted."""
     tested = [f for f in found if f.tested]
     return sorted(found if all(f.refuted for f in tested) else tested, key=lambda f: f.criterion)
 

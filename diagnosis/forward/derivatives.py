@@ -1,7 +1,9 @@
-"""Derivatives of a test's residuals: by all nuisance parameters, by what differs between two lists of effects, and by a light resonance that is not there yet.
+"""Derivatives of a test's residuals: by all nuisance parameters, by what differs between two lists
+of effects, and by a light resonance that is not there yet.
 
-Everything that moves the dynamic stiffness D alone has the exact derivative -A D^-1 (s^2 dM + s dC + dK) D^-1 B^T of the receptance A D^-1 B^T, so that one factorisation a
-line serves all parameters; what also moves rows, gains or delays is differenced. Structure enters K, C and M in proportion: these derivatives are taken once.
+Everything that moves the dynamic stiffness D alone has the exact derivative -A D^-1 (s^2 dM + s dC + dK) D^-1
+B^T of the receptance A D^-1 B^T, so that one factorisation a line serves all parameters; what also moves rows,
+gains or delays is differenced. Structure enters K, C and M in proportion: these derivatives are taken once.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ from thermospindle.model.types import Array, ComplexArray, Integers
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """Derivatives of residuals (N,) of one test by the parameters `numbers` (k,): by each `times` (k,) that of the `rows` (m, N) which has the number `of` (k,). A gain and its drift, a constant
-    discrepancy and the one that drifts, the sizes that a mechanism has in several tests do the same to one of them."""
+    """Derivatives of residuals (N,) of one test by the parameters `numbers` (k,): by each `times` (k,)
+    that of the `rows` (m, N) which has the number `of` (k,). A gain and its drift, a constant discrepancy
+    and the one that drifts, the sizes that a mechanism has in several tests do the same to one of them."""
 
     rows: Array
     numbers: Integers
@@ -56,7 +59,8 @@ class Derivatives:
 
 
 def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, rates: Rates, more: int = 0) -> tuple[Array, Derivatives]:
-    """Residuals (N,) of test `t` and their derivatives by nuisance parameters; the last `more` rows are left zero for whoever has further parameters."""
+    """Residuals (N,) of test `t` and their derivatives by nuisance parameters; the last `more` rows
+    are left zero for whoever has further parameters."""
     data, (linear, response) = model.tests[t], model.standing(t, x, effects)
     discrepancies = _by_discrepancies(model, t, linear, x)
     shared = [_each(rates.numbers[t]), *(of for *_, of in discrepancies)]
@@ -133,7 +137,8 @@ def _after_each_other(every: Sequence[Shared]) -> Shared:
 
 
 def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) -> list[tuple[Array, Integers, Pairs, Shared]]:
-    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), the power of s of each (m,) or what stands in its place, pairs of vectors, and the parameters that they are of."""
+    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), the power
+    of s of each (m,) or what stands in its place, pairs of vectors, and the parameters that they are of."""
     w, ((number, i, j, stiffness), (lossy, a, b, damping)) = model.reference.over(linear.matrices.dofs), model.numbers.discrepancies[t]
     modes = w.shape[1]
     _, first, of = np.unique(i * modes + j, return_index=True, return_inverse=True)
@@ -166,8 +171,8 @@ def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Appli
 
 
 def by_products_of_shares(model: CampaignModel, t: int, x: Array, effects: Applied, modes: int) -> tuple[ComplexArray, ComplexArray]:
-    """Derivatives (k, channels, L) of the FRFs of test `t`, in standard errors each `alone` (`LineData`), by the products of two shares each, in the first reference `modes`, of a light resonance
-    that is not there yet and felt as a mass of -1 / s^2; and s (L,)."""
+    """Derivatives (k, channels, L) of the FRFs of test `t`, in standard errors each `alone` (`LineData`), by the products of two
+    shares each, in the first reference `modes`, of a light resonance that is not there yet and felt as a mass of -1 / s^2; and s (L,)."""
     data, (linear, answer) = model.tests[t], model.standing(t, x, effects)
     assert isinstance(answer, Response)
     assert isinstance(data, LineData)

@@ -1,7 +1,7 @@
 """Where in their records tests were hit, found where they do not tell and answers have not died away at the records' end.
 
-What a record leaves out goes with e^(i omega t0) (`diagnosis.forward.record`): near its peak a mode hardly shows t0, far from it every t0 that is wrong by a period
-is a valley of its own. It is therefore sought on a grid, with all else as it was fitted without effects.
+What a record leaves out goes with e^(i omega t0) (`diagnosis.forward.record`): near its peak a mode hardly shows t0, far from it every
+t0 that is wrong by a period is a valley of its own. It is therefore sought on a grid, with all else as it was fitted without effects.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ MOST = 4000  # points of the grid: of long records and wide bands it reaches les
 
 
 def hit_found(model: CampaignModel, fitted: Array, least: float) -> CampaignModel | None:
-    """The model with its tests hit where that leaves least of the misfit of nuisance values `fitted` (P,): those that do not tell it, at one time of the record, and one that
-    gains `least` by another at that. None where all tell, where records are long enough, or where chi2 does not fall by `least`; and by what the best of so many
-    times gains by chance (ln of their number: chi2 of one number). Nor where it falls by far more than what is left out is in all, which then stands in for something else."""
+    """The model with its tests hit where that leaves least of the misfit of nuisance values `fitted` (P,): those that do not tell
+    it, at one time of the record, and one that gains `least` by another at that. None where all tell, where records are long
+    enough, or where chi2 does not fall by `least`; and by what the best of so many times gains by chance (ln of their number:
+    chi2 of one number). Nor where it falls by far more than what is left out is in all, which then stands in for something else."""
     thin = model.thinned
     untold = [(t, d) for t, d in enumerate(thin.tests) if isinstance(d, LineData) and np.isfinite(d.duration) and d.test.pretrigger is None]
     if not untold or model.numbers.record is None:

@@ -28,8 +28,9 @@ EXACT = 1e-11  # of the largest singular value of a change: products that are le
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """One test's linear model: matrices with dofs, and its measuring chain; `between` is what the mass between nodes of shafts adds to M, the N beside it, and what
-    it adds to C + G (`model.rotor.distributed`), None without shafts; `lost` (3, n, n), of a test of lines, what another law of damping has otherwise (`model.rotor.chain.losses`)."""
+    """One test's linear model: matrices with dofs, and its measuring chain; `between` is what the mass between nodes
+    of shafts adds to M, the N beside it, and what it adds to C + G (`model.rotor.distributed`), None without shafts;
+    `lost` (3, n, n), of a test of lines, what another law of damping has otherwise (`model.rotor.chain.losses`)."""
 
     matrices: Matrices
     chain: Measurement
@@ -73,9 +74,9 @@ def mass_changes(spindle: Spindle, terms: Sequence[MassTerm], dofs: Dofs) -> tup
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Changes of M, C and K by `count` parameters as sums of few products of two vectors, for an element moves few degrees of freedom: the change of
-    the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first; a power from `BY_LAW` on stands for
-    what a law of damping has in its place (`response.Law.whole`)."""
+    """Changes of M, C and K by `count` parameters as sums of few products of two vectors, for an element moves few degrees of freedom:
+    the change of the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of
+    which `first`[i] is the first; a power from `BY_LAW` on stands for what a law of damping has in its place (`response.Law.whole`)."""
 
     count: int
     of: Integers
@@ -92,7 +93,8 @@ class Products:
 
 
 def products(mass: Array, damping: Array, stiffness: Array, lost: Array | None = None) -> Products:
-    """The products of one parameter's dM, dC, dK (n, n), and of the change of what is `lost` (3, n, n), which of dC it is then, to `EXACT` of the largest of each."""
+    """The products of one parameter's dM, dC, dK (n, n), and of the change of what is `lost` (3, n,
+    n), which of dC it is then, to `EXACT` of the largest of each."""
     n = len(mass)
     if lost is not None:
         rest = damping - lost[1] - lost[2]
@@ -113,12 +115,14 @@ def products(mass: Array, damping: Array, stiffness: Array, lost: Array | None =
 
 
 def as_dampers(left: Array, power: Integers) -> tuple[Array, Integers]:
-    """Left vectors (n, m) and powers of s (m,) of products with dampers for all that is lost: what a law of damping adds to them is nothing, and s stands where it may have something else."""
+    """Left vectors (n, m) and powers of s (m,) of products with dampers for all that is lost: what
+    a law of damping adds to them is nothing, and s stands where it may have something else."""
     return np.where(power == BY_LAW, 0.0, left), np.select([power > BY_LAW, power == BY_LAW], [1, 0], power)
 
 
 def pairs(vectors: Array, power: int, of: Pairs) -> Products:
-    """Products of k parameters, of each s^`power` times the sum over pairs i, j `of` its own of u_i u_j^T + u_j u_i^T, u the columns of `vectors` (n, m)."""
+    """Products of k parameters, of each s^`power` times the sum over pairs i, j `of` its own of u_i
+    u_j^T + u_j u_i^T, u the columns of `vectors` (n, m)."""
     k, rows = len(of[0][0]), 2 * len(of)
     first = np.stack([n for i, j in of for n in (i, j)], axis=1).ravel()
     second = np.stack([n for i, j in of for n in (j, i)], axis=1).ravel()

@@ -57,7 +57,8 @@ def check_tables(model: CampaignModel, where: str) -> None:
 
 
 def changes(spindle: Spindle, present: Applied, names: Sequence[str], conditions: Sequence[Condition]) -> list[Nuisance]:
-    """By what the change of the balls' stiffness with temperature and speed may be off, from how speed changes the drawing's across the axis; nothing of a speed at which no spindle can be built."""
+    """By what the change of the balls' stiffness with temperature and speed may be off, from how
+    speed changes the drawing's across the axis; nothing of a speed at which no spindle can be built."""
 
     @cache
     def across(at: Condition) -> Array:

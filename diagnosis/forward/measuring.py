@@ -1,4 +1,5 @@
-"""The measuring chain of a test: sensors off their places and directions, channels that are late, hammers that miss their points, gains of both."""
+"""The measuring chain of a test: sensors off their places and directions, channels that are late,
+hammers that miss their points, gains of both."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ def hammer_gain(numbers: Numbers, t: int, x: Array) -> Array:
 
 
 def _gain(numbers: Numbers, x: Array, number: Integers, index: Integers, of: Integers) -> Array:
-    """Gains of rows (or columns) that are `of` these channels (or hammers), which the parameters by `number` are the ln of, one or more for each `index`."""
+    """Gains of rows (or columns) that are `of` these channels (or hammers), which the parameters by
+    `number` are the ln of, one or more for each `index`."""
     ln = x[number] * numbers.sd[number]
     return np.asarray(np.exp((of[:, None] == index) @ ln))
 
@@ -88,7 +90,8 @@ def aside(point: OperatingPoint) -> Array:
 
 
 def askew(point: OperatingPoint) -> Array:
-    """How the rows of its points change a metre beside their places, the two ways on the face they lie on, and a radian out of their directions towards these (4, points, n)."""
+    """How the rows of its points change a metre beside their places, the two ways on the face they
+    lie on, and a radian out of their directions towards these (4, points, n)."""
     return _askew(point.chain.layout, point.spindle.points)
 
 

@@ -109,7 +109,8 @@ class CampaignModel:
         return unevennesses(self.spindle)
 
     def operating(self, t: int, x: Array, effects: Applied) -> OperatingPoint:
-        """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again, nor rings that settle alike."""
+        """The operating point of test `t`, sizes within their limits; what differs in the measuring
+        chain alone is not worked out again, nor rings that settle alike."""
         effects = within_limits(effects)
         at, little = (t, x[self.numbers.settling[t]].tobytes()), x[self.numbers.little[t]].tobytes()
 
@@ -152,8 +153,8 @@ class CampaignModel:
 
     @cached_property
     def by_condition(self) -> Array:
-        """Relative changes (tests, 2, modes) that temperature and speed make in the frequency and the damping of the modes seen, from the reference condition, of the spindle as drawn; none of
-        one that cannot be built."""
+        """Relative changes (tests, 2, modes) that temperature and speed make in the frequency and the damping of
+        the modes seen, from the reference condition, of the spindle as drawn; none of one that cannot be built."""
         reference = matrices(self._at_reference)
         found = np.zeros((len(self.tests), 2, self.reference.seen))
         for t in range(len(self.tests)):
@@ -169,8 +170,8 @@ class CampaignModel:
         return {}
 
     def linear(self, t: int, x: Array, effects: Applied) -> Linear:
-        """The linear model of test `t`; where the size of an effect lies beyond its limits, the one at the limit and straight on from there: matrices, rows and gains
-        by their derivatives inside."""
+        """The linear model of test `t`; where the size of an effect lies beyond its limits, the one
+        at the limit and straight on from there: matrices, rows and gains by their derivatives inside."""
         inside = within_limits(effects)
         at = found = self._linear(t, x, inside)
         for k, ((effect, values), (_, wanted)) in enumerate(zip(inside, effects, strict=True)):
@@ -198,7 +199,8 @@ class CampaignModel:
         return point.__dict__["_between"]
 
     def bare(self, t: int, x: Array, effects: Applied) -> Linear:
-        """The linear model of test `t` at its operating point as its chain has it: without discrepancies, mass between nodes, and what its measuring chain may be off by."""
+        """The linear model of test `t` at its operating point as its chain has it: without
+        discrepancies, mass between nodes, and what its measuring chain may be off by."""
         point = self.operating(t, x, effects)
         found = point.__dict__.get("_bare")
         if found is None:
@@ -229,7 +231,8 @@ class CampaignModel:
         return w @ self.turned(t, x).whole @ w.T, w @ _modal(damping, x, len(self.reference.omega)) @ w.T
 
     def _lost_otherwise(self, t: int, dofs: Dofs, x: Array, damping: Array) -> Array:
-        """What of `Linear.lost` (3, n, n) the discrepancy of the `damping` (n, n) is: it has the laws of loss factors and of dampers, in the shares that these have in what modes lose."""
+        """What of `Linear.lost` (3, n, n) the discrepancy of the `damping` (n, n) is: it has the
+        laws of loss factors and of dampers, in the shares that these have in what modes lose."""
         share, w = self.by_factors, self.reference.over(dofs) * np.sqrt(self.reference.omega)
         constant = share * w @ _modal(self.numbers.discrepancies[t][1], x, len(self.reference.omega)) @ w.T if share else np.zeros_like(damping)
         return np.array([constant, share * damping, (1 - share) * damping])

@@ -1,4 +1,5 @@
-"""Operating points that differ in little from those that are there: in how far the rings expand, in how bearings differ, or joints about the axis."""
+"""Operating points that differ in little from those that are there: in how far the rings expand, in
+how bearings differ, or joints about the axis."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ Told = Sequence[tuple[Nuisance, float]]
 
 
 def undrawn(numbers: Numbers, t: int, x: Array, bearings: Sequence[str], joints: Sequence[Unevenness], known: Latest[tuple[Effect, Values]]) -> list[tuple[Effect, Values]]:
-    """What `bearings`, balls, `joints` and rings are in test `t`, at nuisance values x (P,), that no drawing has, as effects that act before all others; `known` keeps these."""
+    """What `bearings`, balls, `joints` and rings are in test `t`, at nuisance values x (P,), that
+    no drawing has, as effects that act before all others; `known` keeps these."""
     ways: tuple[tuple[Integers, Callable[[Told], tuple[Effect, Values]]], ...] = (
         (numbers.expansion, lambda told: stretched(*(1 + value for _, value in told))),
         (numbers.uneven, lambda told: uneven([(joints[p.index], value) for p, value in told])),
@@ -61,7 +63,8 @@ def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Valu
 
 
 def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple[Effect, Values]:
-    """Stiffness and damping of bearings, by name, off by these shares less their mean: what all have in common is a tolerance of the preload and of the damping."""
+    """Stiffness and damping of bearings, by name, off by these shares less their mean: what all
+    have in common is a tolerance of the preload and of the damping."""
     stiffer, lossier = ({b: 1 + share - sum(own.values()) / len(own) for b, share in own.items()} for own in (stiffness, damping))
 
     def of(name: str) -> tuple[float, float]:
@@ -78,8 +81,9 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
 def otherwise(
     shares: Mapping[int, float], warmer: float = 0.0, own: Sequence[float] = (0.0, 0.0, 0.0, 0.0), rows: Mapping[int, float] = NO_ROWS, orbits: float = 0.0
 ) -> tuple[Effect, Values]:
-    """Stiffness and damping of ball rows off by these shares, in each of `DIRECTIONS` by number; in all directions by `warmer` at `RANGE_K` from the reference temperature, in
-    proportion to that; by `own` as `CHANGES` has it; in all directions of `rows` by number; and by a share of what balls would be that had each its own of the `orbits`."""
+    """Stiffness and damping of ball rows off by these shares, in each of `DIRECTIONS` by number; in all directions
+    by `warmer` at `RANGE_K` from the reference temperature, in proportion to that; by `own` as `CHANGES` has it; in
+    all directions of `rows` by number; and by a share of what balls would be that had each its own of the `orbits`."""
     across, along, in_tilt, between = own
     d = np.sqrt(np.maximum(1 + np.array([across, across, along, along + in_tilt, along + in_tilt]), 0.0))
     for i, share in shares.items():
@@ -108,7 +112,8 @@ def _by_orbits(spindle: Spindle, bearings: Sequence[BearingState], share: float)
 
 
 def uneven(shares: Sequence[tuple[Unevenness, float]]) -> tuple[Effect, Values]:
-    """Joints stiffer by a share one way and less stiff by as much across, or segments of a shaft stiffer by it, to first order: K -> S K S, damping with it."""
+    """Joints stiffer by a share one way and less stiff by as much across, or segments of a shaft
+    stiffer by it, to first order: K -> S K S, damping with it."""
     by_joint: dict[str, Array] = {}
     for u, share in shares:
         for joint, pattern in u.patterns:

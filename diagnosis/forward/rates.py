@@ -1,4 +1,5 @@
-"""How the matrices of every test change with what tolerances, thermometers, the expansion of materials and of rings, and bearings among themselves may be off by."""
+"""How the matrices of every test change with what tolerances, thermometers, the expansion of
+materials and of rings, and bearings among themselves may be off by."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ STEP = 0.02  # of a prior standard deviation, for differences
 
 
 def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
-    """dM, dC, dK by build tolerances, expansion of materials and rings, bearings apart, stiffness and inertia of balls, uneven joints, temperature and how bodies have their mass, for every test; what structure alone moves is kept from `old`."""
+    """dM, dC, dK by build tolerances, expansion of materials and rings, bearings apart, stiffness and inertia of balls,
+    uneven joints, temperature and how bodies have their mass, for every test; what structure alone moves is kept from `old`."""
     numbers, each, dofs, uneven = [], [], [], frozenset(model.numbers.uneven)
     for t, effects in enumerate(effects_of):
         base, speed = model.bare(t, x, effects), model.operating(t, x, effects).chain.speed

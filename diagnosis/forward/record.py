@@ -1,11 +1,13 @@
 """What records that end before the answer has died away leave out of FRFs, and how that moves.
 
-Of a velocity's mode p A e^(p t) a record of R seconds that was hit at t0 leaves out the part after T = R - t0, -p A e^((p - w) T) e^(-i omega T) / (s - p) with w what windows add. At
-the lines 1/R apart of a discrete Fourier transform e^(-i omega T) is e^(i omega t0), so that the part is smooth over lines (Brandt, *Noise and Vibration Analysis*, 2011, 10.3).
+Of a velocity's mode p A e^(p t) a record of R seconds that was hit at t0 leaves out the part after T = R - t0, -p A e^((p
+- w) T) e^(-i omega T) / (s - p) with w what windows add. At the lines 1/R apart of a discrete Fourier transform e^(-i
+omega T) is e^(i omega t0), so that the part is smooth over lines (Brandt, *Noise and Vibration Analysis*, 2011, 10.3).
 
-With the state matrix A = V diag(p) V^-1 it is -C (s - A)^-1 e^((A - w) T) B. Its derivatives need that of the exponential, whose elements in V are
-those of V^-1 dA V times the divided differences of e^(p T) (Higham, *Functions of Matrices*, 2008, Theorem 3.11). A change s^q u v^T of the dynamic
-stiffness has (V^-1 dA V)_ij = -(l_i u) p_j^q (v r_j), l and r the left and right vectors; one of the mass changes B, too.
+With the state matrix A = V diag(p) V^-1 it is -C (s - A)^-1 e^((A - w) T) B. Its derivatives need that of
+the exponential, whose elements in V are those of V^-1 dA V times the divided differences of e^(p T)
+(Higham, *Functions of Matrices*, 2008, Theorem 3.11). A change s^q u v^T of the dynamic stiffness has (V^-1
+dA V)_ij = -(l_i u) p_j^q (v r_j), l and r the left and right vectors; one of the mass changes B, too.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ CLOSE = 1e-5  # times 1 / T, below which two poles' difference is their derivati
 
 @dataclass(frozen=True, eq=False)
 class RecordEnd:
-    """The end of records, `duration` T seconds after the hit: `poles` p, with `force` (n, n_ref) of the references on them and `at_end` (n,) e^((p - w) T); of those
-    `seen` at the end `away` (k, L), (s - p) e^(-i omega t0), and what responses read of a velocity, `factor` (n_resp, L) of their `rows` (n_resp, r)."""
+    """The end of records, `duration` T seconds after the hit: `poles` p, with `force` (n, n_ref) of the
+    references on them and `at_end` (n,) e^((p - w) T); of those `seen` at the end `away` (k, L), (s - p)
+    e^(-i omega t0), and what responses read of a velocity, `factor` (n_resp, L) of their `rows` (n_resp, r)."""
 
     duration: float
     poles: Poles
@@ -65,7 +68,8 @@ class RecordEnd:
 
     @cached_property
     def _swept(self) -> ComplexArray:
-        """How much of what drives a pole comes to each pole seen by the references, (n, k n_ref): divided differences of e^(p T), times `force`."""
+        """How much of what drives a pole comes to each pole seen by the references, (n, k n_ref):
+        divided differences of e^(p T), times `force`."""
         p, e, t = self.poles.value, self.at_end, self.duration
         apart = p[self.seen, None] - p[None, :]
         close = np.abs(apart) * t < CLOSE
@@ -73,7 +77,8 @@ class RecordEnd:
         return np.ascontiguousarray((between.T[:, :, None] * self.force[:, None, :]).reshape(len(p), -1))
 
     def kicked(self, left: Array, right: Array, power: Integers) -> ComplexArray:
-        """How the amplitudes (m, k, n_ref) of the seen poles at the records' end change with s^`power` `left` `right`^T (r, m) in the dynamic stiffness, of powers up to 2."""
+        """How the amplitudes (m, k, n_ref) of the seen poles at the records' end change with
+        s^`power` `left` `right`^T (r, m) in the dynamic stiffness, of powers up to 2."""
         p = self.poles.value
         shape, heavy = right.T @ self.poles.right, power == 2
         amplitude = ((shape * np.stack([np.ones_like(p), p, p**2])[power]) @ self._swept).reshape(len(shape), len(self.seen), -1)

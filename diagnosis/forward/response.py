@@ -25,8 +25,9 @@ FEW = 2  # times as many products as a parameter may have, for each to be follow
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """A light resonance: a mass of one on a spring on the generalised force b = `columns` (n, k) `shares` (k,), which adds s^2 m(s) b b^T to the dynamic
-    stiffness with m = (2 z w s + w^2) / (s^2 + 2 z w s + w^2) (Den Hartog, *Mechanical Vibrations*, 1956, 3.2); its frequency drifts with what is `far`."""
+    """A light resonance: a mass of one on a spring on the generalised force b = `columns` (n, k) `shares`
+    (k,), which adds s^2 m(s) b b^T to the dynamic stiffness with m = (2 z w s + w^2) / (s^2 + 2 z w s +
+    w^2) (Den Hartog, *Mechanical Vibrations*, 1956, 3.2); its frequency drifts with what is `far`."""
 
     columns: Array
     shares: Array
@@ -45,7 +46,8 @@ class Light:
 
 @dataclass(frozen=True)
 class Law:
-    """How far what loss factors lose, and what `dampers` do, is the same at all frequencies, in which case dampers lose as much as they do at `omega` (rad/s)."""
+    """How far what loss factors lose, and what `dampers` do, is the same at all frequencies, in
+    which case dampers lose as much as they do at `omega` (rad/s)."""
 
     factors: float = 0.0
     dampers: float = 0.0
@@ -63,8 +65,9 @@ class Law:
 class Response:
     """FRFs of one test's linear model at its lines, in the measured quantity.
 
-    `cut` is the share in which records end before the answer has died away: 0 for FRFs of an infinite record. A flexible shaft answers through
-    its reduced model (`model.rotor.reduced`), which is off by 1e-5 of the largest response at most, with its mass where it is and not at nodes, which the modes kept know nothing of: 3e-4 at the highest lines.
+    `cut` is the share in which records end before the answer has died away: 0 for FRFs of an infinite record. A flexible
+    shaft answers through its reduced model (`model.rotor.reduced`), which is off by 1e-5 of the largest response at
+    most, with its mass where it is and not at nodes, which the modes kept know nothing of: 3e-4 at the highest lines.
     """
 
     def __init__(self, linear: Linear, data: LineData, gain: Array, cut: float = 0.0, lights: Sequence[Light] = (), law: Law = Law()) -> None:
@@ -171,7 +174,8 @@ class Response:
         return columns if self._basis is None else self._basis.T @ columns
 
     def by_light(self, light: Light) -> ComplexArray:
-        """Derivatives (k + 4, n_resp, n_ref, L) by the shares of a light resonance, its ln frequency, its ln damping and how ln frequency drifts."""
+        """Derivatives (k + 4, n_resp, n_ref, L) by the shares of a light resonance, its ln
+        frequency, its ln damping and how ln frequency drifts."""
         left, right = self._modal(light.columns)
         felt = -light.felt(self.s)
         own_left, own_right = np.tensordot(light.shares, left, 1), np.tensordot(light.shares, right, 1)
@@ -187,13 +191,15 @@ class Response:
         return self._answering(sum((-added[i] * _over(self._onto(self._lost[i]).T, self._driven) for i in own), np.zeros_like(self._driven)))
 
     def by_products_of_shares(self, columns: Array, rows: Integers, others: Integers) -> ComplexArray:
-        """Derivatives (k, n_resp, n_ref, L) by products of two shares each of light resonances on `columns` (n, m), for one that is felt as a mass of -1 / s^2."""
+        """Derivatives (k, n_resp, n_ref, L) by products of two shares each of light resonances on
+        `columns` (n, m), for one that is felt as a mass of -1 / s^2."""
         left, right = self._modal(columns)
         found = left[rows][:, :, None] * right[others][:, None] + left[others][:, :, None] * right[rows][:, None]
         return np.where(rows == others, 0.5, 1.0)[:, None, None, None] * found
 
     def _modal(self, columns: Array) -> tuple[ComplexArray, ComplexArray]:
-        """What responses read of a force on each of a light resonance's `columns` (k, n_resp, L), and how references move these (k, n_ref, L)."""
+        """What responses read of a force on each of a light resonance's `columns` (k, n_resp, L),
+        and how references move these (k, n_ref, L)."""
         of = self.over(columns)
         return _over(of, self._read), _over(of, self._driven)
 
@@ -236,8 +242,9 @@ class Response:
         return found
 
     def moved_together(self, columns: Array, power: Integers, of: Pairs) -> Iterator[ComplexArray]:
-        """Derivatives (k, n_resp, n_ref, L) by factors of the sum over pairs i, j `of` each of s^`power`_i (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m), of equal power (m,) in a pair:
-        a few at a time, for they fill memory rather than a cache."""
+        """Derivatives (k, n_resp, n_ref, L) by factors of the sum over pairs i, j `of` each of
+        s^`power`_i (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m), of
+        equal power (m,) in a pair: a few at a time, for they fill memory rather than a cache."""
         read, driven = self.read(columns), self.driven(columns, power)
         first, second = (np.stack(numbers, axis=1) for numbers in zip(*(pair for i, j in of for pair in ((i, j), (j, i))), strict=True))
         for at in range(0, len(first), TOGETHER):
@@ -263,14 +270,15 @@ class Response:
         return found if (end := self._late) is None else found + self._cut * end.of(end.poles.left @ columns)
 
     def heard(self, rows: Array) -> ComplexArray:
-        """What responses would read by as much as their rows are `rows` (n_resp, n) more, (n_resp, n_ref, L), less what of it comes after the records' end."""
+        """What responses would read by as much as their rows are `rows` (n_resp, n) more, (n_resp,
+        n_ref, L), less what of it comes after the records' end."""
         columns = self.over(rows.T)
         found = _over(columns, self._driven) * self.factor[:, None]
         return found if (end := self._late) is None else found + self._cut * replace(end, rows=columns.T).value
 
     def driven(self, columns: Array, power: Integers) -> ComplexArray:
-        """The force (m, n_ref, L) that appears on one vector where s^`power` times it and `columns` (r, m) is added to the dynamic stiffness, less what
-        of it comes after the records' end."""
+        """The force (m, n_ref, L) that appears on one vector where s^`power` times it and `columns`
+        (r, m) is added to the dynamic stiffness, less what of it comes after the records' end."""
         found = np.empty((len(power), *self._driven.shape[1:]), complex)
         for p in np.unique(power):
             found[power == p] = _over(columns[:, power == p], self._forced(int(p)))

@@ -1,8 +1,9 @@
 """A measured shape beside the nearest one that a model has at its frequency, in coordinates across the measured one.
 
-Let m be the measured shape and phi the computed one, each divided by the standard errors of its points; the size and the phase of either tell nothing. With
-Q an orthonormal basis across m and a = m^H phi / |m| |phi| the residual is |m| Q^H phi / |phi| a* / |a|, whose length is |m| sin(angle between them), that of the
-least-squares residual m - c phi. Of modes that coincide phi is the combination nearest to m: they turn in their plane at the slightest asymmetry.
+Let m be the measured shape and phi the computed one, each divided by the standard errors of its points; the size and
+the phase of either tell nothing. With Q an orthonormal basis across m and a = m^H phi / |m| |phi| the residual is
+|m| Q^H phi / |phi| a* / |a|, whose length is |m| sin(angle between them), that of the least-squares residual m - c
+phi. Of modes that coincide phi is the combination nearest to m: they turn in their plane at the slightest asymmetry.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ class ShapeBeside:
         return self._told(self.measured.size * (self.measured.across.conj().T @ near) * phase / (length or 1.0))
 
     def moved(self, by: ComplexArray) -> Array:
-        """Derivatives (k, N) of the residual where the nearest shape moves by the columns of `by` (n, k); what lies among the `basis` is a turn, and none.
+        """Derivatives (k, N) of the residual where the nearest shape moves by the columns of `by`
+        (n, k); what lies among the `basis` is a turn, and none.
 
         That the combination follows is left out, which is of the second order in the angle (Kaufman 1975, BIT 15, 49).
         """

@@ -65,9 +65,9 @@ class Table:
         return np.concatenate([*of_poles, *self._shapes_moved(by)]).T
 
     def _shapes_moved(self, by: Products) -> list[Array]:
-        """Derivatives (N, k) of the residual of every shape. That of a right vector over those of other modes than its group's is
-        right_j (left_j (p^2 dM + p dC + dK) right) / (p_j - p), p its own pole: first order again, for the terms of the pole's own change add up to
-        a multiple of the vector (Adhikari 1999, AIAA J. 37, 1452)."""
+        """Derivatives (N, k) of the residual of every shape. That of a right vector over those of other modes than
+        its group's is right_j (left_j (p^2 dM + p dC + dK) right) / (p_j - p), p its own pole: first order again,
+        for the terms of the pole's own change add up to a multiple of the vector (Adhikari 1999, AIAA J. 37, 1452)."""
         if not self._shapes:
             return []
         p, found = self._poles, []
@@ -114,7 +114,8 @@ class Table:
 
     @cached_property
     def _vectors(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Poles (m,) of the table's modes with right (n, m) and left vectors (m, n); of a flexible shaft without shapes by its reduced model."""
+        """Poles (m,) of the table's modes with right (n, m) and left vectors (m, n); of a flexible
+        shaft without shapes by its reduced model."""
         if self._data.shapes:
             own = self._own
             return self._poles.value[own], self._poles.right[:, own], self._poles.left[own]

@@ -4,9 +4,10 @@ About the fit chi2 is a quadratic in all parameters p: c - 2 b p + p A p. For pr
 
     ln Z(Pi, s) = -c / 2 s^2 + b (A / s^2 + Pi^-1)^-1 b / 2 s^4 - ln det(1 + Pi A / s^2) / 2 - n ln s,
 
-(MacKay, *Neural Computation* 4 (1992) 415, Eq. 2.6). Sizes learned so, each over a short grid: of the model's constant and drifting
-discrepancies in stiffness and damping, of gain drift (these also between its places), of build tolerances and of the errors s (at their likeliest: empirical Bayes), and of every mechanism its
-width and its departure from its law (the mean over the grid). What is quoted is the posterior at the best place.
+(MacKay, *Neural Computation* 4 (1992) 415, Eq. 2.6). Sizes learned so, each over a short grid: of the model's
+constant and drifting discrepancies in stiffness and damping, of gain drift (these also between its places), of
+build tolerances and of the errors s (at their likeliest: empirical Bayes), and of every mechanism its width
+and its departure from its law (the mean over the grid). What is quoted is the posterior at the best place.
 """
 
 from __future__ import annotations
@@ -45,17 +46,20 @@ WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
 FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law: its width is to be learned
 OFFSET = -12.0
-"""Prior odds (ln) that what drifts is off by as much in all tests as well: that is a drawing that is off (`WIDER`), and not what temperature and speed do."""
+"""Prior odds (ln) that what drifts is off by as much in all tests as well: that is a drawing that
+is off (`WIDER`), and not what temperature and speed do."""
 FARTHEST = 3.0  # times what a shape parameter does at the fitted size of a test, of what it does at the size that all share
 ROUNDED = 1.0  # of chi2, which is never negative: what rounding may take from a quadratic that stands for a fit
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """ln evidence; what was learned; posterior mean (n,) and covariance (n, n) of all parameters, and of the sizes of every mechanism in every
-    test: mean (mechanisms, tests) and covariance (mechanisms, tests, tests), in their units, and the covariance `as_shaped`, with shape parameters as they are. `by_departing` is what of the ln evidence the mechanisms with a
-    law gain by departing from it, and `as_fitted` ln of the probability of the data with the mechanisms' parameters at their mean, nuisances integrated: ln evidence without the price of
-    these parameters (Besag, *J. R. Statist. Soc. B* 51 (1989) 579: p(data) = p(data | theta) p(theta) / p(theta | data), at any theta)."""
+    """ln evidence; what was learned; posterior mean (n,) and covariance (n, n) of all parameters, and of the sizes of
+    every mechanism in every test: mean (mechanisms, tests) and covariance (mechanisms, tests, tests), in their units,
+    and the covariance `as_shaped`, with shape parameters as they are. `by_departing` is what of the ln evidence the
+    mechanisms with a law gain by departing from it, and `as_fitted` ln of the probability of the data with the
+    mechanisms' parameters at their mean, nuisances integrated: ln evidence without the price of these parameters
+    (Besag, *J. R. Statist. Soc. B* 51 (1989) 579: p(data) = p(data | theta) p(theta) / p(theta | data), at any theta)."""
 
     ln: float
     learned: Learned
@@ -73,16 +77,18 @@ class Evidence:
 
     @property
     def rounded(self) -> bool:
-        """Whether the fit stands so far from where its quadratic is least that nothing but rounding is left of that, and the evidence means nothing."""
+        """Whether the fit stands so far from where its quadratic is least that nothing but rounding
+        is left of that, and the evidence means nothing."""
         return self.chi2 < -ROUNDED
 
 
 def evidence(
     model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide: bool = False, kept: Sequence[Nuisances] = (), learning: Sequence[str] | None = None
 ) -> Evidence:
-    """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
-    errors are taken from the best of these, which is quick, and quicker with the nuisances `kept` of each (`integrated`). Build tolerances are as stated, or with `wide` as much wider as is likeliest; with `learning` the
-    sizes of these kinds alone are learned, and errors are as stated. What a fit with the data's own errors still owes is not counted."""
+    """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of
+    discrepancies, drift and errors are taken from the best of these, which is quick, and quicker with the nuisances `kept` of
+    each (`integrated`). Build tolerances are as stated, or with `wide` as much wider as is likeliest; with `learning` the sizes
+    of these kinds alone are learned, and errors are as stated. What a fit with the data's own errors still owes is not counted."""
     turn = amplitudes_apart(fit)
     by_test, gradient, information = at_one_size(fit), fit.gradient, fit.information
     if by_test is not fit.by_test:
@@ -161,11 +167,12 @@ def integrated(model: CampaignModel, fit: Fit, errors: float, sizes: Mapping[str
 
 
 def amplitudes_apart(fit: Fit) -> csr_array:
-    """Coordinates (n, n) of the quadratic about a fit in which a shape parameter of a mechanism with a law of the data's own changes what the mechanism does
-    and not how much of it.
+    """Coordinates (n, n) of the quadratic about a fit in which a shape parameter of a mechanism
+    with a law of the data's own changes what the mechanism does and not how much of it.
 
-    What a shape parameter moves at the fitted sizes is in proportion to these: to a quadratic it could stand in for them, and for their law over the
-    tests, which of its own it has not. So with each, the size in every test gives way by what it would change of the amount: sizes' part of its column.
+    What a shape parameter moves at the fitted sizes is in proportion to these: to a quadratic it could
+    stand in for them, and for their law over the tests, which of its own it has not. So with each, the
+    size in every test gives way by what it would change of the amount: sizes' part of its column.
     """
     every, at = np.arange(len(fit.point)), len(fit.nuisance)
     rows, columns = [every], [every]
@@ -186,11 +193,11 @@ def amplitudes_apart(fit: Fit) -> csr_array:
 
 
 def at_one_size(fit: Fit) -> Sequence[tuple[float, Array, Array]]:
-    """chi2, gradient (n,) and information (n, n) of every test about a fit, in which a shape parameter of a mechanism that has a law does in every test what it does
-    at one size, the likeliest that all share.
+    """chi2, gradient (n,) and information (n, n) of every test about a fit, in which a shape parameter of
+    a mechanism that has a law does in every test what it does at one size, the likeliest that all share.
 
-    At the fitted sizes it moves each test in proportion to its own. Where these depart from the law, so that one test has nearly all of it, a shape parameter would
-    move that test alone, and to a quadratic a law that holds could explain it.
+    At the fitted sizes it moves each test in proportion to its own. Where these depart from the law, so that one test has
+    nearly all of it, a shape parameter would move that test alone, and to a quadratic a law that holds could explain it.
     """
     if not fit.by_test or not any(m.kind == "law" and m.shape for m in fit.mechanisms):
         return fit.by_test
@@ -224,8 +231,8 @@ def _departures(effect: Effect) -> tuple[float, ...]:
 
 
 def own_grid(m: Mechanism) -> dict[Own, float]:
-    """Width, departure and offset that a mechanism may have, with the ln of their prior odds, which add up to one. What grows from a reference has an offset
-    there only where nothing but its element is told."""
+    """Width, departure and offset that a mechanism may have, with the ln of their prior odds, which add
+    up to one. What grows from a reference has an offset there only where nothing but its element is told."""
     offsets = {1.0: 0.0} if m.reference is None else {0.0: 0.0, 1.0: OFFSET} if m.free else {0.0: 0.0}
     found = {(w, d, o): ln for w in (WIDTHS if m.kind == "law" else FREE_WIDTHS) for d in _departures(m.effect) for o, ln in offsets.items()}
     whole = float(logsumexp(list(found.values())))
@@ -242,9 +249,9 @@ def _roots(conditions: tuple[Condition, ...], reference: Condition | None, count
 
 
 def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> tuple[float, float]:
-    """Of groups of tests predicted each from all others, with what was learned from all: root mean square residual, in standard errors of the data, and the sum
-    of ln of their probability densities, which knows how sure a prediction is (Geisser & Eddy, *J. Am. Statist. Assoc.* 74 (1979) 153). Not a number where
-    there are no others."""
+    """Of groups of tests predicted each from all others, with what was learned from all: root mean square residual,
+    in standard errors of the data, and the sum of ln of their probability densities, which knows how sure a
+    prediction is (Geisser & Eddy, *J. Am. Statist. Assoc.* 74 (1979) 153). Not a number where there are no others."""
     s, prior, own = found.learned.errors, nuisance_root(model, found.learned.sizes, fit.moved), mechanism_root(model, fit.mechanisms, found.learned)
     turn, p = amplitudes_apart(fit), len(model.parameters)
     by_test = [turned(turn, *b, fit.point) for b in at_one_size(fit)]

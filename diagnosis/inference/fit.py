@@ -1,9 +1,9 @@
 """Fitting nuisance parameters and the sizes of mechanisms to a campaign: Levenberg-Marquardt with priors, tempered.
 
-Peaks that do not overlap do not pull at each other: with the data's own errors a fit stalls. Errors are therefore first taken thousands of
-times too large, so that priors rule and all peaks move together, then less and less (a homotopy: Allgower & Georg, *Numerical Continuation
-Methods*, 1990). What moves a peak by its width bends every valley of the cost: a step along one is corrected with the derivatives at hand before
-it is judged. A step to where no spindle can be built is taken shorter.
+Peaks that do not overlap do not pull at each other: with the data's own errors a fit stalls. Errors are therefore first
+taken thousands of times too large, so that priors rule and all peaks move together, then less and less (a homotopy: Allgower
+& Georg, *Numerical Continuation Methods*, 1990). What moves a peak by its width bends every valley of the cost: a step along
+one is corrected with the derivatives at hand before it is judged. A step to where no spindle can be built is taken shorter.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ AFAR = 30.0  # chi2 a number at the start, from which errors are enlarged first
 
 @dataclass(frozen=True)
 class Held:
-    """A shape parameter, by its number, at a limit that it would leave: half the slope of chi2 towards the inside, and half its curvature with all else
-    fitted anew, without its own prior's: what that is beside chi2 depends on how large errors are taken."""
+    """A shape parameter, by its number, at a limit that it would leave: half the slope of chi2 towards the inside, and half its
+    curvature with all else fitted anew, without its own prior's: what that is beside chi2 depends on how large errors are taken."""
 
     number: int
     slope: float
@@ -46,11 +46,12 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Where a model stands: nuisance values x (P,) in prior standard deviations, sizes (mechanisms, tests) and shape parameters of every mechanism
-    in their units; and the quadratic of chi2 about it over all parameters p = [x, z, u]: chi2 + 2 gradient (p - point) + (p - point) information
-    (p - point), with z the whitened sizes (`roots`) and u the shape parameters, mechanism by mechanism.
+    """Where a model stands: nuisance values x (P,) in prior standard deviations, sizes (mechanisms, tests) and shape parameters of
+    every mechanism in their units; and the quadratic of chi2 about it over all parameters p = [x, z, u]: chi2 + 2 gradient (p - point)
+    + (p - point) information (p - point), with z the whitened sizes (`roots`) and u the shape parameters, mechanism by mechanism.
 
-    `by_test` holds chi2, gradient and information of every test. What is `held` at a limit (`Problem.held`) is no parameter of the quadratic.
+    `by_test` holds chi2, gradient and information of every test. What is `held` at a limit
+    (`Problem.held`) is no parameter of the quadratic.
     """
 
     mechanisms: tuple[Mechanism, ...]
@@ -88,9 +89,10 @@ def fit(
     tempers: Sequence[float] = TEMPERS, learned: Learned | None = None, moved: Array = UNMOVED, beaten: float = np.inf,
     done: Callable[[int, int], object] = lambda count, of: None,
 ) -> Fit:
-    """The fit with the reference widths of all priors, or those `learned`, with what may be misjudged of conditions and mechanisms that `moved` the modes; of several
-    starts from the one of least cost, and from there with errors as much larger at first as it is `AFAR`. While they are taken too large, the thinned model serves.
-    What ends above the cost `beaten` need not end exactly. `done` is told how many of the steps in temper are, and of how many.
+    """The fit with the reference widths of all priors, or those `learned`, with what may be misjudged of conditions
+    and mechanisms that `moved` the modes; of several starts from the one of least cost, and from there with errors as
+    much larger at first as it is `AFAR`. While they are taken too large, the thinned model serves. What ends above
+    the cost `beaten` need not end exactly. `done` is told how many of the steps in temper are, and of how many.
 
     Raises what the model raises where even the start cannot be built.
     """
@@ -126,7 +128,8 @@ def _from_afar(problem: Problem, p: Array, first: float) -> Sequence[float]:
 
 @dataclass(frozen=True)
 class _Pace:
-    """How the next step is taken: how stiff, how much stiffer after a refusal, how far derivatives are believed, and how short it is after steps that were `refused` one after the other."""
+    """How the next step is taken: how stiff, how much stiffer after a refusal, how far derivatives
+    are believed, and how short it is after steps that were `refused` one after the other."""
 
     damping: float = LEAST_DAMPING
     growth: float = 2.0
@@ -153,9 +156,10 @@ class _Pace:
 
 
 def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: float) -> tuple[Array, Linearisation, Sequence[Array], Rates]:
-    """Levenberg-Marquardt steps at one temper until the cost stands still, damped as in Madsen, Nielsen & Tingleff, *Methods for Non-Linear Least
-    Squares Problems*, 2004, algorithm 3.16. Derivatives are taken anew only where a step does not do what it promises, or gains little; at the last temper the
-    rates too, for the cost stands still where the gradient is right. There a step that is refused is shortened before it is made stiffer."""
+    """Levenberg-Marquardt steps at one temper until the cost stands still, damped as in Madsen, Nielsen &
+    Tingleff, *Methods for Non-Linear Least Squares Problems*, 2004, algorithm 3.16. Derivatives are taken anew
+    only where a step does not do what it promises, or gains little; at the last temper the rates too, for the cost
+    stands still where the gradient is right. There a step that is refused is shortened before it is made stiffer."""
     last, count = temper == 1.0, sum(d.count for d in problem.model.tests)
     lines = problem.linearisation(p, rates)
     here, pace = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals)), _Pace()
@@ -219,8 +223,8 @@ def promised(slope: Array, normal: Array, move: Array) -> float:
 
 
 def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: float, there: Point) -> Point:
-    """The best of a few steps on from a point with the derivatives of the one before: peaks narrower than they move bend every valley, and a step along
-    it is back on its floor after them."""
+    """The best of a few steps on from a point with the derivatives of the one before: peaks
+    narrower than they move bend every valley, and a step along it is back on its floor after them."""
     best = there
     for _ in range(CORRECTIONS):
         there = problem.at(there.p + problem.step(there.p, lines.slope(problem, there, temper), normal), temper)
@@ -270,7 +274,8 @@ def _held(problem: Problem, p: Array, slope: Array, normal: Array) -> tuple[Held
 
 
 def _moved(problem: Problem, p: Array) -> Array:
-    """Relative changes (1 + mechanisms, tests, 2, modes) that the conditions, and each mechanism, make in the frequency and the damping of the reference modes, to first order."""
+    """Relative changes (1 + mechanisms, tests, 2, modes) that the conditions, and each mechanism,
+    make in the frequency and the damping of the reference modes, to first order."""
     model, (x, sizes, shapes) = problem.model, problem.parts(p)
     own = model.reference
     found = np.zeros((1 + len(problem.mechanisms), *model.by_condition.shape))

@@ -1,5 +1,5 @@
-"""What would have to drift, where nobody names a cause: every element's stiffness and damping, the rings' positions, the preload, the mass of what turns, and a
-spring that holds it from outside.
+"""What would have to drift, where nobody names a cause: every element's stiffness and damping, the
+rings' positions, the preload, the mass of what turns, and a spring that holds it from outside.
 
 Free-form models compete with the named effects by the same evidence. They have no law: how much they change in each test is free, only
 continuous over the conditions, and its width is learned. So a named effect whose law holds beats them, for it has less to choose; one
@@ -47,8 +47,8 @@ SKEW[0, 1], SKEW[1, 0] = 1.0, -1.0
 
 
 def free_forms(spindle: Spindle, reference: Condition | None = None) -> list[Mechanism]:
-    """One mechanism for everything that might drift; its size in per cent (of ln) or um is what changes in each test. With a `reference` what the drawing has drifts
-    from there, where it may be off as it may in all tests; what the drawing does not have acts anywhere."""
+    """One mechanism for everything that might drift; its size in per cent (of ln) or um is what changes in each test. With a `reference`
+    what the drawing has drifts from there, where it may be off as it may in all tests; what the drawing does not have acts anywhere."""
     found = []
     shafts = spindle.structure.shafts
     joints = spindle.structure.own_joints
@@ -81,8 +81,8 @@ def free_forms(spindle: Spindle, reference: Condition | None = None) -> list[Mec
 
 
 def _tied(spindle: Spindle) -> list[Mechanism]:
-    """A spring between the ground and what turns: a seal that rubs, a hose, a tool that touches; one that pushes away is a magnet's (Earnshaw). It acts at
-    the middle, and on a shaft, across the axis, at any measuring point too."""
+    """A spring between the ground and what turns: a seal that rubs, a hose, a tool that touches; one that pushes away
+    is a magnet's (Earnshaw). It acts at the middle, and on a shaft, across the axis, at any measuring point too."""
     if not any(b.turns for b in spindle.structure.bodies):
         return []
     low, high = spindle.hammer.band
@@ -180,8 +180,8 @@ def _stiffened(names: list[str], moves):
 
 
 def _crossed(names: list[str]):
-    """k_xy = -k_yx, told as a change of the radial stiffness would be: what films and seals have, and feeds one whirl while it damps the other (Friswell and others, *Dynamics of
-    Rotating Machines*, 2010, 7.3)."""
+    """k_xy = -k_yx, told as a change of the radial stiffness would be: what films and seals have, and feeds
+    one whirl while it damps the other (Friswell and others, *Dynamics of Rotating Machines*, 2010, 7.3)."""
 
     def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
         def crossed(b: BearingState) -> BearingState:
@@ -217,14 +217,15 @@ def _preloaded(sets: list[str]):
 
 
 def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, shape: Sequence[float] | None = None) -> bool:
-    """Whether a free form changes what an effect of the catalogue changes, whatever the law: whether in every test the two move all lines in the same
-    direction, to `ALIKE` of their squares. `x` (P,) are the nuisances where that is asked, and `shape` the effect's (neutral unless given)."""
+    """Whether a free form changes what an effect of the catalogue changes, whatever the law:
+    whether in every test the two move all lines in the same direction, to `ALIKE` of their squares.
+    `x` (P,) are the nuisances where that is asked, and `shape` the effect's (neutral unless given)."""
     return _apart(_by_size(model, x, free), _by_size(model, x, named, shape)) < ALIKE
 
 
 def as_told_by(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, sizes: Array) -> Array | None:
-    """Sizes (tests,) of an effect of the catalogue with a law of the data's own that do, to first order about nuisances `x` (P,), what `sizes` (tests,) of a
-    free form do; None where the two do not move the same: to `NEARLY` of the squares, enough to start a fit from."""
+    """Sizes (tests,) of an effect of the catalogue with a law of the data's own that do, to first order about nuisances `x` (P,), what
+    `sizes` (tests,) of a free form do; None where the two do not move the same: to `NEARLY` of the squares, enough to start a fit from."""
     of_free, of_named = _by_size(model, x, free), _by_size(model, x, named)
     if _apart(of_free, of_named) >= NEARLY:
         return None
@@ -232,9 +233,9 @@ def as_told_by(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism
 
 
 def runs_against(model: CampaignModel, x: Array, law: Mechanism, own: Mechanism, sizes: Array, covariance: Array) -> bool:
-    """Whether an effect that can only be of one sign, with a law of the data's `own`, is told by nothing but that there is less of it where its `law` has more: sizes (tests,)
-    of which none is known to be there, for a tolerance does what all have in common, and which are less, by more than `CANNOT` standard errors, where the law does more, and nowhere
-    there more."""
+    """Whether an effect that can only be of one sign, with a law of the data's `own`, is told by nothing but that there is
+    less of it where its `law` has more: sizes (tests,) of which none is known to be there, for a tolerance does what all have
+    in common, and which are less, by more than `CANNOT` standard errors, where the law does more, and nowhere there more."""
     amounts = own.size.sign * (sizes - own.size.neutral)
     if not own.size.sign or np.any(amounts > 2 * np.sqrt(np.maximum(np.diag(covariance), 0.0))):
         return False
@@ -271,9 +272,9 @@ def drifting(
     element: str, *, name: str, title: str, equation: str, law: Callable, parameters: tuple[Parameter, ...], source: str,
     at: Mapping[str, float] | None = None, others: Mapping[str, float] | None = None,
 ) -> Effect:
-    """An effect of one's own: what the free form called `element` changes, by `law`(temperature C, speed rpm, values) in its unit; with `others` what the
-    effect of the catalogue called `element` changes, its size by the law and these parameters as given, by its formula or with `at` as that has it at this
-    condition (temperature_C, speed_rpm, level_N, soak_time_min).
+    """An effect of one's own: what the free form called `element` changes, by `law`(temperature C, speed rpm, values) in its
+    unit; with `others` what the effect of the catalogue called `element` changes, its size by the law and these parameters as
+    given, by its formula or with `at` as that has it at this condition (temperature_C, speed_rpm, level_N, soak_time_min).
 
     What `spindle draft` writes is made with it; it acts where the free form or that effect acts, and at size zero not at all.
     """

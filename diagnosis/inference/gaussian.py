@@ -1,5 +1,5 @@
-"""Integrals of a quadratic over Gaussian priors, of which evidence is made, and what limits do to them: shape parameters between limits, or held at one, and
-sizes of one sign."""
+"""Integrals of a quadratic over Gaussian priors, of which evidence is made, and what limits do to
+them: shape parameters between limits, or held at one, and sizes of one sign."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ class Marginal:
         return float(self.constant + self.b @ p - p @ self.a @ p / 2)
 
     def integrated(self, roots: Sequence[Array]) -> Array:
-        """ln of the integral (g_1 g_2 ...,) over the priors of all mechanisms, each with every one of its `roots` (g_k, m_k, m_k): one mechanism
-        after the other, by Schur complements."""
+        """ln of the integral (g_1 g_2 ...,) over the priors of all mechanisms, each with every one
+        of its `roots` (g_k, m_k, m_k): one mechanism after the other, by Schur complements."""
         constant, b, a = np.array([self.constant]), self.b[None], self.a[None]
         for root in roots:
             m, turned = root.shape[-1], root.transpose(0, 2, 1)
@@ -70,8 +70,8 @@ class Marginal:
 
 
 def _factor(information: Array) -> Array:
-    """Cholesky factors (..., m, m) of 1 + `information`, of which rounding may have made what is nothing less than nothing: where nuisances do all that a
-    mechanism does, their difference is of the rounding of either."""
+    """Cholesky factors (..., m, m) of 1 + `information`, of which rounding may have made what is nothing less
+    than nothing: where nuisances do all that a mechanism does, their difference is of the rounding of either."""
     one = np.eye(information.shape[-1])
     try:
         return np.asarray(np.linalg.cholesky(information + one))
@@ -82,8 +82,8 @@ def _factor(information: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Nuisances:
-    """The first parameters (p,) of a quadratic under their prior R R^T, of which R (p, r) is the `root`: what all mechanisms that stand beside them have in common. `factor` (r, r) is the lower
-    Cholesky factor of 1 + R^T A R."""
+    """The first parameters (p,) of a quadratic under their prior R R^T, of which R (p, r) is the `root`: what all
+    mechanisms that stand beside them have in common. `factor` (r, r) is the lower Cholesky factor of 1 + R^T A R."""
 
     root: csr_array
     factor: Array
@@ -149,8 +149,8 @@ def ln_integral(q: Quadratic, nuisances: Nuisances, own: Array) -> float:
 
 
 def ln_within_limits(fit: Fit, mean: Array, spread: Array, errors: float) -> float:
-    """ln of the posterior probability, to a quadratic, that shape parameters are within their limits, over the prior's; of one that is held at a limit, of the
-    integral of what falls off from there, `errors` being so many times those stated."""
+    """ln of the posterior probability, to a quadratic, that shape parameters are within their limits, over the prior's; of
+    one that is held at a limit, of the integral of what falls off from there, `errors` being so many times those stated."""
     found, at, held = 0.0, len(fit.nuisance), {h.number: h for h in fit.held}
     for m, root in zip(fit.mechanisms, fit.roots, strict=True):
         for number, q in enumerate(m.shape, at + len(root)):
@@ -171,9 +171,10 @@ def ln_within_limits(fit: Fit, mean: Array, spread: Array, errors: float) -> flo
 def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, float, float], mean: Array, covariance: Array) -> float:
     """ln of twice the posterior probability of the sign that limits allow: a size that may not be negative has half its prior.
 
-    The sign is that of the size a which all tests share, about which `own` (width, departure, offset) lets them scatter: a_t = a (1 + r_t), of which the
-    posterior `mean` (n,) and `covariance` (n, n) are given, that with shape parameters as they are (`opposite`); of what grows from a reference, of the sum of its slopes (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian
-    Processes*, 2006, Eq. A.6).
+    The sign is that of the size a which all tests share, about which `own` (width, departure, offset) lets them
+    scatter: a_t = a (1 + r_t), of which the posterior `mean` (n,) and `covariance` (n, n) are given, that with
+    shape parameters as they are (`opposite`); of what grows from a reference, of the sum of its slopes
+    (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian Processes*, 2006, Eq. A.6).
     """
     sign = mechanism.size.sign
     if not sign:
@@ -189,8 +190,10 @@ def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, floa
 
 
 def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
-    """Whether a mechanism would need sizes (tests,) that it cannot have: whether those that it can lie farther from them, all tests taken together, than `CANNOT` standard errors of one are by
-    chance, were the truth at the limit: chi-bar-squared, of as many independent tests as there are (Silvapulle & Sen, *Constrained Statistical Inference*, 2005, Eq. 3.5). What is alike in all tests may be a build tolerance's as well, and a size that is off by that is not told by one test's standard error."""
+    """Whether a mechanism would need sizes (tests,) that it cannot have: whether those that it can lie farther from them, all
+    tests taken together, than `CANNOT` standard errors of one are by chance, were the truth at the limit: chi-bar-squared, of
+    as many independent tests as there are (Silvapulle & Sen, *Constrained Statistical Inference*, 2005, Eq. 3.5). What is alike
+    in all tests may be a build tolerance's as well, and a size that is off by that is not told by one test's standard error."""
     if m.size.limits[0] <= sizes.min() and sizes.max() <= m.size.limits[1]:
         return False
     variance, along = np.linalg.eigh(covariance)
@@ -201,7 +204,8 @@ def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
 
 
 def _independent(m: Mechanism, sizes: Array, covariance: Array) -> int:
-    """How many independent sizes those are worth that are not well within their limits: (sum of the eigenvalues)^2 over the sum of their squares, of their correlations."""
+    """How many independent sizes those are worth that are not well within their limits: (sum of the
+    eigenvalues)^2 over the sum of their squares, of their correlations."""
     sd = np.sqrt(np.maximum(np.diag(covariance), (TINY * m.size.prior_sd) ** 2))
     low, high = m.size.limits
     near = np.minimum(sizes - low, high - sizes) < CANNOT * sd
@@ -223,9 +227,10 @@ def apart_by(sizes: Array, covariance: Array) -> Array:
 
 
 def opposite(m: Mechanism, sizes: Array, covariance: Array) -> bool:
-    """Whether a mechanism would need the sign that it cannot have: in every test (tests,), by more than twice its standard error, or by more than `CANNOT` in one and the
-    sign that it can have in none; where its law does nothing any sign would do. The `covariance` (tests, tests) is that with shape parameters as they are: an amount times what they make of it may be
-    told along a hyperbola, which never comes to the other sign, where a quadratic does (a flange that stiffened was named as one that loosens, by -0.0055 +- 0.004)."""
+    """Whether a mechanism would need the sign that it cannot have: in every test (tests,), by more than twice its standard error, or
+    by more than `CANNOT` in one and the sign that it can have in none; where its law does nothing any sign would do. The `covariance`
+    (tests, tests) is that with shape parameters as they are: an amount times what they make of it may be told along a hyperbola, which
+    never comes to the other sign, where a quadratic does (a flange that stiffened was named as one that loosens, by -0.0055 +- 0.004)."""
     sign, (low, high) = m.size.sign, m.size.limits
     beyond = sign * ((low if sign > 0 else high) - sizes) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return bool(sign and (np.all(beyond > 2) or (beyond.max() > CANNOT and beyond.min() > -2)))

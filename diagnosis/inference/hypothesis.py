@@ -63,7 +63,8 @@ class Hypothesis:
 
     @property
     def farthest_shape(self) -> float:
-        """Of all shape parameters how far the farthest is from what is known of it, in its prior's standard deviations; nothing where there are none."""
+        """Of all shape parameters how far the farthest is from what is known of it, in its prior's
+        standard deviations; nothing where there are none."""
         rows = zip(self.mechanisms, self.fit.shapes, strict=True)
         return max((abs(u - q.neutral) / q.prior_sd for m, row in rows for q, u in zip(m.shape, row, strict=True)), default=0.0)
 
@@ -95,8 +96,8 @@ def fitted(
 
 
 def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, beaten: float, task: Task) -> Hypothesis | None:
-    """A fit; with `afresh` from where a `scan` leads while errors are larger still, if that costs less. Once more with errors enlarged where it did not
-    reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
+    """A fit; with `afresh` from where a `scan` leads while errors are larger still, if that costs less. Once more with errors enlarged
+    where it did not reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
     mechanisms, starts = task.mechanisms, task.starts
     prior = steady(expected, mechanisms)
     try:
@@ -120,8 +121,8 @@ def as_drawn(model: CampaignModel, point: Array) -> Array:
 
 
 def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, ...]:
-    """Starts with no tolerance off its drawing and one mechanism of a size, by its law in all tests: what moves peaks by many of their widths has no
-    slope to follow from where it does not act."""
+    """Starts with no tolerance off its drawing and one mechanism of a size, by its law in all tests:
+    what moves peaks by many of their widths has no slope to follow from where it does not act."""
     problem = Problem(model, mechanisms)
     conditions = [d.condition for d in model.tests]
     scanned = [(k, m.size.neutral + s * m.size.prior_sd * shared(m, conditions), m.size.limits) for k, m in enumerate(mechanisms) for s in SCAN]
@@ -129,10 +130,11 @@ def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, 
 
 
 def settled(model: CampaignModel, h: Hypothesis, best: float = -np.inf) -> Hypothesis:
-    """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is. What is more than `PLENTY` behind the `best` ln evidence, and comes
-    no nearer, need not stand there exactly, and is fitted anew once.
+    """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is. What
+    is more than `PLENTY` behind the `best` ln evidence, and comes no nearer, need not stand there exactly, and is fitted anew once.
 
-    It starts from its own answer, or from the fit where the model is no quadratic as far as that, without what was learned to be nothing. What ends with less evidence than the quadratic promised
+    It starts from its own answer, or from the fit where the model is no quadratic as far as that,
+    without what was learned to be nothing. What ends with less evidence than the quadratic promised
     may have stalled on that way, whatever it costs at first, and is fitted from the other start too.
     """
     wide = kinds_of.BUILD in h.evidence.learned.sizes
@@ -161,8 +163,8 @@ def settled(model: CampaignModel, h: Hypothesis, best: float = -np.inf) -> Hypot
 
 
 def widened(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Hypothesis:
-    """With build tolerances wider than stated, where that is likelier, and promises the `least` ln evidence that counts: a drawing that is off. Nothing is sought
-    with them, for they would take what is missing before anything is found."""
+    """With build tolerances wider than stated, where that is likelier, and promises the `least` ln evidence that counts:
+    a drawing that is off. Nothing is sought with them, for they would take what is missing before anything is found."""
     wide = evidence(model, h.fit, wide=True)
     if wide.learned.sizes[kinds_of.BUILD] == 1.0 or wide.ln < least:
         return h

@@ -35,7 +35,8 @@ PAIRS = 8  # fitted at most
 EXCHANGED = 8  # effects tried in either's place
 ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit, and a third at least
 ASKED = {"law": LITTLE, "own law": ENOUGH, "free": PLENTY}
-"""ln evidence that a second mechanism must promise beside one that leaves none: less than its odds is by chance, and what is wrong in a law looks like a little of what may be anything."""
+"""ln evidence that a second mechanism must promise beside one that leaves none: less than its odds
+is by chance, and what is wrong in a law looks like a little of what may be anything."""
 
 
 def joined(
@@ -61,8 +62,9 @@ def joined(
 def joined_early(
     model: CampaignModel, none: Hypothesis, tried: Singles, pairs: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], workers
 ) -> list[Hypothesis]:
-    """Two mechanisms joined while errors are still enlarged, where the best that was tried leaves something: where a fit has not arrived, nothing tells what is
-    missing beside it, and two causes of which neither alone moves peaks to where they are let none arrive."""
+    """Two mechanisms joined while errors are still enlarged, where the best that was tried leaves
+    something: where a fit has not arrived, nothing tells what is missing beside it, and two causes
+    of which neither alone moves peaks to where they are let none arrive."""
     best = max((none, *tried.singles, *pairs), key=lambda h: h.evidence.ln)
     if not tried.early or not strained(best):
         return []
@@ -78,9 +80,9 @@ def joined_early(
 
 
 def without_one(model: CampaignModel, found: Sequence[Hypothesis], most: float, expected: Learned, workers) -> list[Hypothesis]:
-    """The best explanations of several mechanisms, of all and of the catalogue, without each of them, as far as the rest was not fitted together, or fell behind without one that does
-    nothing, so that it had stalled: they came to be one by one, and what came first may be what the others do without (backward elimination: Draper & Smith, *Applied Regression Analysis*,
-    3rd ed. 1998, 15.3)."""
+    """The best explanations of several mechanisms, of all and of the catalogue, without each of them, as far as the rest was not
+    fitted together, or fell behind without one that does nothing, so that it had stalled: they came to be one by one, and what came
+    first may be what the others do without (backward elimination: Draper & Smith, *Applied Regression Analysis*, 3rd ed. 1998, 15.3)."""
     ranked = sorted(found, key=lambda h: h.evidence.ln)
     known = {with_laws(h.mechanisms): h.evidence.ln for h in ranked}
     leads = {id(best): best for best in (next((h for h in reversed(ranked) if not h.free or free), None) for free in (True, False)) if best is not None}
@@ -103,8 +105,8 @@ def without_one(model: CampaignModel, found: Sequence[Hypothesis], most: float, 
 def exchanged(
     model: CampaignModel, found: Sequence[Hypothesis], tried: Singles, workers
 ) -> list[Hypothesis]:
-    """Two effects of which neither has its law, with either exchanged for each of those that promised or explained most alone: where peaks are far off, screening
-    beside the first chooses badly, and what has no law of its own stands in for anything."""
+    """Two effects of which neither has its law, with either exchanged for each of those that promised or explained most alone:
+    where peaks are far off, screening beside the first chooses badly, and what has no law of its own stands in for anything."""
     best = max((h for h in found if not h.free), key=lambda h: h.evidence.ln, default=None)
     if best is None or len(best.mechanisms) != 2 or min(best.evidence.learned.departures) < DEPARTS:
         return []

@@ -29,11 +29,13 @@ REFERENCE = {
     kinds_of.CHANGE: kinds_of.CHANGE_SD,
     kinds_of.EXPANSION: 1.0,
 }
-"""Widths in which nuisances of unknown size are counted; build tolerances and hammers' gains in those that the scene states, thermal motions in `EXPANSION_SD`."""
+"""Widths in which nuisances of unknown size are counted; build tolerances and hammers' gains in
+those that the scene states, thermal motions in `EXPANSION_SD`."""
 ACTION = 3.0  # times the relative error of frequencies, by which what the model says of temperature and speed, and of an effect, may be wrong at least
 AGEING = 2.0
-"""What a gain that drifts is off by at the first and the last test, going straight with their order, times what it scatters by: amplifiers warm up, calibrations age. Chosen on one
-campaign of another's simulator with nothing hidden, in which a sensor lost 2 % over nine tests and scattered by 0.3 %."""
+"""What a gain that drifts is off by at the first and the last test, going straight with their order,
+times what it scatters by: amplifiers warm up, calibrations age. Chosen on one campaign of another's
+simulator with nothing hidden, in which a sensor lost 2 % over nine tests and scattered by 0.3 %."""
 Own = tuple[float, float, float]
 """Width in a size's own prior standard deviations, departure and offset of one mechanism."""
 UNMOVED = np.zeros((0, 0, 2, 0))
@@ -43,8 +45,8 @@ NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a p
 
 @dataclass(frozen=True)
 class Learned:
-    """What is likeliest: `sizes` of discrepancies, of gain drift and of build tolerances by kind of nuisance, the factor of the stated errors; width,
-    departure and offset of every mechanism (`size_covariance`)."""
+    """What is likeliest: `sizes` of discrepancies, of gain drift and of build tolerances by kind of nuisance,
+    the factor of the stated errors; width, departure and offset of every mechanism (`size_covariance`)."""
 
     sizes: Mapping[str, float]
     errors: float
@@ -65,8 +67,8 @@ CHANGING = (*DRIFTING, kinds_of.CHANGE)
 
 
 def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
-    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, bearings change otherwise, thermal motions and a drawing are off, is left as it is on
-    paper, so that none takes what the mechanisms should explain."""
+    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, bearings change
+    otherwise, thermal motions and a drawing are off, is left as it is on paper, so that none takes what the mechanisms should explain."""
     on_paper = (*CHANGING, kinds_of.EXPANSION, kinds_of.BUILD)
     sizes = {kind: REFERENCE[kind] if kind in on_paper else max(REFERENCE[kind], size) for kind, size in learned.sizes.items() if kind in REFERENCE}
     return as_stated(sizes, mechanisms)
@@ -110,10 +112,12 @@ def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Arra
 def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Array:
     """Root (P, k) of the prior covariance that what is misjudged of conditions and effects adds to the drift of modes.
 
-    A model whose frequencies are constantly wrong is wrong, too, in what temperature, speed and an effect do: of the relative change of frequency and of damping that
-    conditions and each mechanism make of a mode, `moved` (1 + mechanisms, tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the
-    frequencies at least, or what was learned of either. Of a mechanism that is what it does beyond the least that it does in any test: what it does in all of them alike may be misjudged as the drawing is, by a constant error of modes,
-    which every explanation has. Two effects of no use, as much in every test and each other's opposite, had 120 in ln evidence by letting the one mode that both move be off by what they may be.
+    A model whose frequencies are constantly wrong is wrong, too, in what temperature, speed and an effect do: of the relative
+    change of frequency and of damping that conditions and each mechanism make of a mode, `moved` (1 + mechanisms, tests, 2, modes),
+    a share is wrong, the same in all tests: `ACTION` times the relative error of the frequencies at least, or what was learned of
+    either. Of a mechanism that is what it does beyond the least that it does in any test: what it does in all of them alike may be
+    misjudged as the drawing is, by a constant error of modes, which every explanation has. Two effects of no use, as much in every
+    test and each other's opposite, had 120 in ln evidence by letting the one mode that both move be off by what they may be.
     """
     least, kinds = ACTION * sizes.get(kinds_of.STIFFNESS, 0.0), (kinds_of.OF_CONDITIONS, *[kinds_of.ACTION] * (len(moved) - 1))
     shares = np.array([max(least, sizes.get(kind, 0.0)) for kind in kinds])
@@ -131,7 +135,8 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
 
 
 def ageing(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
-    """Root (P, k) of the prior covariance of gains that go straight with the order in which the campaign lists its tests, in proportion to their drift from test to test."""
+    """Root (P, k) of the prior covariance of gains that go straight with the order in which the
+    campaign lists its tests, in proportion to their drift from test to test."""
     order, found = np.linspace(-1.0, 1.0, len(model.tests)), [np.zeros((len(model.parameters), 0))]
     test, index, _ = model.numbers.places
     for kind in AGES:
@@ -161,15 +166,16 @@ def mechanism_covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], 
 
 @lru_cache(maxsize=256)
 def whitened_covariance(conditions: tuple[Condition, ...], reference: Condition | None, counted: Own, own: Own) -> Array:
-    """Covariance (tests, tests) of z = root^-1 (sizes - neutral), where the root is that of what is `counted` in: the same for every mechanism of one
-    reference, as widths are counted in its own standard deviation."""
+    """Covariance (tests, tests) of z = root^-1 (sizes - neutral), where the root is that of what is `counted`
+    in: the same for every mechanism of one reference, as widths are counted in its own standard deviation."""
     root = np.linalg.cholesky(size_covariance(conditions, *counted, reference))
     half = solve_triangular(root, size_covariance(conditions, *own, reference), lower=True)
     return np.asarray(solve_triangular(root, half.T, lower=True))
 
 
 def together(scale: Array, beside: Array) -> csr_array:
-    """R (P, r) of the covariance R R^T of parameters that have each a width of their own, `scale` (P,), and `beside` (P, k) what is not each by itself; those without either have no columns."""
+    """R (P, r) of the covariance R R^T of parameters that have each a width of their own, `scale`
+    (P,), and `beside` (P, k) what is not each by itself; those without either have no columns."""
     wide = np.flatnonzero(scale)
     rows, columns = beside.nonzero()
     terms, places = np.concatenate([scale[wide], beside[rows, columns]]), (np.concatenate([wide, rows]), np.concatenate([np.arange(len(wide)), len(wide) + columns]))
@@ -190,8 +196,8 @@ def mechanism_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learne
 def precision_and_variances(
     model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None, moved: Array = UNMOVED
 ) -> tuple[Array, Array]:
-    """The inverse (n, n) of the prior covariance, with next to nothing for sizes of zero, and the diagonal (n,) of that covariance; of the reference
-    widths, which are ones, without `learned`."""
+    """The inverse (n, n) of the prior covariance, with next to nothing for sizes of zero, and the
+    diagonal (n,) of that covariance; of the reference widths, which are ones, without `learned`."""
     if learned is None:
         n = len(model.parameters) + sum(len(model.tests) + len(m.shape) for m in mechanisms)
         return np.eye(n), np.ones(n)
@@ -207,8 +213,8 @@ def precision_and_variances(
 
 
 def _floored(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> tuple[Array, Array, Array]:
-    """The parts of a prior covariance that can be inverted: variances (P,) of nuisances, the root (P, k) of what is correlated, and the covariance (m, m) of
-    the mechanisms."""
+    """The parts of a prior covariance that can be inverted: variances (P,) of nuisances, the root
+    (P, k) of what is correlated, and the covariance (m, m) of the mechanisms."""
     own = mechanism_covariance(model, mechanisms, learned.own)
     alone = np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2)
     return alone, correlated(model, learned.sizes, moved), own + NOTHING**2 * np.eye(len(own))

@@ -69,8 +69,8 @@ class Problem:
         return np.flatnonzero(((p <= self.low) & (slope > 0)) | ((p >= self.high) & (slope < 0)))
 
     def step(self, p: Array, slope: Array, normal: Array, longest: float = LONGEST) -> Array:
-        """The move (n,) from `p` to the least of a quadratic of the cost within the limits, shortened to the `longest` one: the quadratic of what is limited alone, all
-        else following it, is solved between bounds."""
+        """The move (n,) from `p` to the least of a quadratic of the cost within the limits, shortened to the
+        `longest` one: the quadratic of what is limited alone, all else following it, is solved between bounds."""
         limited = np.isfinite(self.low) | np.isfinite(self.high)
         free, move = ~limited, np.zeros(self.length)
         follows = np.linalg.solve(normal[np.ix_(free, free)], np.column_stack([slope[free], normal[np.ix_(free, limited)]]))
@@ -106,8 +106,8 @@ class Problem:
         return p
 
     def within_prior(self, p: Array) -> Array:
-        """Where the prior allows next to nothing that is taken from a parameter vector (n,), and the rest of it left: what was fitted with wide priors does
-        not start a fit with narrow ones from a wall."""
+        """Where the prior allows next to nothing that is taken from a parameter vector (n,), and the rest
+        of it left: what was fitted with wide priors does not start a fit with narrow ones from a wall."""
         return np.asarray(np.linalg.solve(self.precision + NARROW * np.eye(self.length), NARROW * p))
 
     def applied(self, t: int, sizes: Array, shapes: Sequence[Array]) -> list:
@@ -165,8 +165,8 @@ class Problem:
         return [self.acting(self.applied(t, sizes, shapes)) for t in range(self.tests)]
 
     def linearisation(self, p: Array, rates: Rates, held: Integers = NONE) -> Linearisation:
-        """Of all tests, without the parameters that are `held` where they are; with rates of its own where a mechanism that has gone, or come, took degrees of
-        freedom with it."""
+        """Of all tests, without the parameters that are `held` where they are; with rates of its
+        own where a mechanism that has gone, or come, took degrees of freedom with it."""
         x, effects_of = self.parts(p)[0], self.effects_of(p)
         if any(self.model.standing(t, x, own)[0].matrices.dofs != dofs for t, (own, dofs) in enumerate(zip(effects_of, rates.dofs, strict=True))):
             rates = rates_of(self.model, x, effects_of, rates)

@@ -1,8 +1,8 @@
 """What an explanation leaves of the data: how far its residuals say the same, and the light resonance that would make them.
 
-A resonance that the drawing lacks (of the table, a fixture, a cable) is there in every test. It is no effect that changes over conditions, and yet it
-spoils a fit by many standard errors, which tolerances are then strained to take. Where an explanation misses the data alike in all tests, the
-oscillator on the machine that would make that is looked for, and becomes part of the model where the data ask for it.
+A resonance that the drawing lacks (of the table, a fixture, a cable) is there in every test. It is no effect that changes over conditions,
+and yet it spoils a fit by many standard errors, which tolerances are then strained to take. Where an explanation misses the data alike in
+all tests, the oscillator on the machine that would make that is looked for, and becomes part of the model where the data ask for it.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ SPACING, DAMPING = 0.02, 0.02  # of neighbouring frequencies (ln) at which a lig
 
 @dataclass(frozen=True)
 class Overlap:
-    """How far residuals say the same: `lines`, 1 + 2 sum of their autocorrelation over neighbouring lines; `tests`, the mean correlation of one test's
-    with another's. `inflation` is by how much fewer numbers they are worth.
+    """How far residuals say the same: `lines`, 1 + 2 sum of their autocorrelation over neighbouring lines; `tests`,
+    the mean correlation of one test's with another's. `inflation` is by how much fewer numbers they are worth.
 
-    1, 0 and 1 for noise. What a model misses is smooth over lines, and what it misses everywhere (a resonance of the table) is there in every test:
-    ln evidence is divided by the inflation (Bartlett 1946; Bayley & Hammersley, *J. R. Statist. Soc. Suppl.* 8 (1946) 184).
+    1, 0 and 1 for noise. What a model misses is smooth over lines, and what it misses everywhere (a resonance of the table) is there in
+    every test: ln evidence is divided by the inflation (Bartlett 1946; Bayley & Hammersley, *J. R. Statist. Soc. Suppl.* 8 (1946) 184).
     """
 
     lines: float
@@ -73,8 +73,8 @@ def says_nothing(count: float) -> float:
 
 
 def between_tests(left: Sequence[tuple[Array, Array]], alike: float = 1.0) -> float:
-    """Mean correlation of residuals (channels, lines) at frequencies (lines,) of one test with those of another at its nearest lines, `alike` of which say the same; what chance
-    makes counts as none."""
+    """Mean correlation of residuals (channels, lines) at frequencies (lines,) of one test with those
+    of another at its nearest lines, `alike` of which say the same; what chance makes counts as none."""
     found = []
     for a, (lines, r) in enumerate(left):
         for b, (other_lines, other) in enumerate(left):
@@ -87,10 +87,11 @@ def between_tests(left: Sequence[tuple[Array, Array]], alike: float = 1.0) -> fl
 
 
 def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: Sequence[float] = (0.0,)) -> tuple[Resonance, float] | None:
-    """The light resonance that would explain most beside the model `about`, its frequency moving by one of `drifts`, and the ln evidence that it promises; None where no
-    test has FRF lines, or no mode of the reference is in their band.
+    """The light resonance that would explain most beside the model `about`, its frequency moving by one of `drifts`, and
+    the ln evidence that it promises; None where no test has FRF lines, or no mode of the reference is in their band.
 
-    To first order the products of its shares count, a symmetric matrix; its shares are the first eigenvector's, those of modes beyond the band none.
+    To first order the products of its shares count, a symmetric matrix; its shares are the first
+    eigenvector's, those of modes beyond the band none.
     """
     lines = [d.frequency for d in model.tests if isinstance(d, LineData)]
     seen = model.reference.seen
@@ -143,8 +144,9 @@ def _alone(data: TestData, residual: Array, by: Derivatives) -> tuple[Array, Der
 
 
 def by_frequency(moved: ComplexArray, felt: ComplexArray, residual: Array, derivatives: Array) -> tuple[Array, Array, Array]:
-    """Of columns that are the real and imaginary parts, one after the other, of `moved` (k, channels, L) times each of `felt` (F, L): their products with `derivatives` (n, N), (F, n, k), among
-    themselves (F, k, k), and with the `residual` (N,), (F, k). What is felt is the same for all channels of a line, so that these are summed up once."""
+    """Of columns that are the real and imaginary parts, one after the other, of `moved` (k, channels, L) times each
+    of `felt` (F, L): their products with `derivatives` (n, N), (F, n, k), among themselves (F, k, k), and with the
+    `residual` (N,), (F, k). What is felt is the same for all channels of a line, so that these are summed up once."""
     k, channels, lines = moved.shape
     every = np.concatenate([derivatives, residual[None]]).view(complex).reshape(-1, channels, lines)
     by_line = np.moveaxis(moved, -1, 0)  # (L, k, channels)
@@ -156,8 +158,8 @@ def by_frequency(moved: ComplexArray, felt: ComplexArray, residual: Array, deriv
 
 
 def _promised(cross: Array, square: Array, slope: Array, inverse: Array, gradient: Array, errors: float) -> tuple[Array, float]:
-    """Parameters (k,) of prior width one whose derivatives, over all tests, make `cross` (n, k) with those of the model's parameters, `square` (k, k) among themselves and `slope`
-    (k,) with the residual; and the ln evidence that they would gain."""
+    """Parameters (k,) of prior width one whose derivatives, over all tests, make `cross` (n, k) with those of the model's
+    parameters, `square` (k, k) among themselves and `slope` (k,) with the residual; and the ln evidence that they would gain."""
     information = (square - cross.T @ inverse @ cross) / errors**2 + np.eye(len(slope))
     left = (slope - cross.T @ inverse @ gradient) / errors**2
     found = np.asarray(-np.linalg.solve(information, left), float)

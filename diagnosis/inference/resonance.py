@@ -1,5 +1,5 @@
-"""The model with a light resonance more, where the data of every test ask for one: of a table, a fixture or a cable that the drawing lacks, or of something that
-softens with temperature and whose resonance moves."""
+"""The model with a light resonance more, where the data of every test ask for one: of a table, a fixture
+or a cable that the drawing lacks, or of something that softens with temperature and whose resonance moves."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ CENTRED = 2  # times that a light resonance's parameters are counted anew from w
 
 
 def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = None, moves: bool = False) -> tuple[CampaignModel, Hypothesis] | None:
-    """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
-    leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence tells; without effects not even that where
-    modes still drift beside it, for what changes from test to test is no resonance, and one that is taken for it then stands in the effect's way. With `moves` one
-    whose frequency may be another at another temperature."""
+    """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it;
+    None where it leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence
+    tells; without effects not even that where modes still drift beside it, for what changes from test to test is no resonance, and
+    one that is taken for it then stands in the effect's way. With `moves` one whose frequency may be another at another temperature."""
     if len(model.resonances) >= RESONANCES + moves:
         return None
     resonance = _left_by(model, h, moves)
@@ -73,8 +73,8 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
 
 
 def _centred(resonance: Resonance, fitted: Array, moves: bool) -> tuple[Resonance, Array]:
-    """The resonance about where its parameters (k + 4,) were fitted, and what is left of these: how its frequency drifts, unless it `moves`, for a table's stays narrow
-    about none."""
+    """The resonance about where its parameters (k + 4,) were fitted, and what is left of these: how
+    its frequency drifts, unless it `moves`, for a table's stays narrow about none."""
     there = resonance.at(np.array([q.sd for q in resonance.nuisances]) * fitted)
     left = np.zeros(len(fitted))
     if moves:
@@ -99,8 +99,8 @@ def _left_by(model: CampaignModel, h: Hypothesis, moves: bool = False) -> Resona
 
 
 def shown(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
-    """The light resonances that an explanation needs, as it has them: where their shares in all modes may be nothing, what they were taken for is explained
-    otherwise."""
+    """The light resonances that an explanation needs, as it has them: where their shares in all
+    modes may be nothing, what they were taken for is explained otherwise."""
     return [r for r, _ in _needed(model, h)]
 
 

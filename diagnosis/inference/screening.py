@@ -41,8 +41,8 @@ class Screened:
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """What is fitted already, its discrepancies and errors of the sizes learned: its information and the prior's precision (n, n) as factors, and the ln evidence;
-    and its nuisances at these sizes and at others `near` them."""
+    """What is fitted already, its discrepancies and errors of the sizes learned: its information and the prior's
+    precision (n, n) as factors, and the ln evidence; and its nuisances at these sizes and at others `near` them."""
 
     model: CampaignModel
     about: Fit
@@ -56,8 +56,8 @@ class _Beside:
 def screen(
     model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None
 ) -> list[Screened]:
-    """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`, or smaller;
-    and the best of each name, and kind of law, once more with its shape `turned`."""
+    """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of
+    discrepancies as `learned`, or smaller; and the best of each name, and kind of law, once more with its shape `turned`."""
     about = replace(rated(model, about), temper=temper)
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0)
     prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors), about.moved)
@@ -91,7 +91,8 @@ def _screened(beside: _Beside, mechanism: Mechanism) -> Screened:
 
 
 def _turned(beside: _Beside, drawn: Screened) -> Screened:
-    """The best that a mechanism promises with its shape parameters moved in turn: what a disk on the hub would not do, one within the hub may."""
+    """The best that a mechanism promises with its shape parameters moved in turn: what a disk on
+    the hub would not do, one within the hub may."""
     mechanism = drawn.mechanism
     problem, shape, best = Problem(beside.model, [*beside.about.mechanisms, mechanism]), np.zeros(len(mechanism.shape)), drawn
     for k, q in enumerate(mechanism.shape):
@@ -105,15 +106,17 @@ def _turned(beside: _Beside, drawn: Screened) -> Screened:
 
 
 def visibilities(model: CampaignModel, about: Fit, learned: Learned, mechanisms: Sequence[Mechanism]) -> list[float]:
-    """Standard errors by which the typical size of each of `mechanisms` shows beside the model `about`, its discrepancies and errors of the sizes `learned`."""
+    """Standard errors by which the typical size of each of `mechanisms` shows beside the model
+    `about`, its discrepancies and errors of the sizes `learned`."""
     prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=learned.errors), about.moved)
     factors = cho_factor(linearised(model, about).information + prior.precision)
     return [_visibility(_by_size(Problem(model, [*about.mechanisms, m]), about, np.zeros(len(m.shape)))[1], m, factors, learned.errors) for m in mechanisms]
 
 
 def _by_size(problem: Problem, about: Fit, shape: Array) -> tuple[Array, list[tuple[Array, Integers, float, float]]]:
-    """The parameters (n,) of the fitted model with the last mechanism at no size beside, its `shape` parameters so many prior standard deviations from neutral; and of every test what that
-    mechanism's size does there: its derivatives' products with all others' (first,), with themselves and with the residuals."""
+    """The parameters (n,) of the fitted model with the last mechanism at no size beside, its `shape`
+    parameters so many prior standard deviations from neutral; and of every test what that mechanism's size
+    does there: its derivatives' products with all others' (first,), with themselves and with the residuals."""
     at, k, first = linearised(problem.model, about), len(about.mechanisms), len(about.point)
     p = np.concatenate([about.point, np.zeros(problem.length - first)])
     p[problem.length - len(shape) :] = shape
@@ -129,7 +132,8 @@ def _by_size(problem: Problem, about: Fit, shape: Array) -> tuple[Array, list[tu
 
 
 def _visibility(rows: Sequence[tuple[Array, Integers, float, float]], mechanism: Mechanism, factors: tuple[Array, bool], errors: float) -> float:
-    """Standard errors by which the typical size of a mechanism, one in all tests, shows beside all else, of which the information with the prior's has these `factors`."""
+    """Standard errors by which the typical size of a mechanism, one in all tests, shows beside all
+    else, of which the information with the prior's has these `factors`."""
     typical, square = np.zeros(len(factors[0])), 0.0
     for cross, numbers, of_test, _ in rows:
         typical[numbers] += cross
@@ -139,8 +143,8 @@ def _visibility(rows: Sequence[tuple[Array, Integers, float, float]], mechanism:
 
 
 def _promised(problem: Problem, beside: _Beside, shape: Array) -> Screened:
-    """The quadratic of the fitted model, with the sizes of the last mechanism beside its parameters; its `shape` parameters stay where they are, in prior
-    standard deviations from neutral."""
+    """The quadratic of the fitted model, with the sizes of the last mechanism beside its parameters;
+    its `shape` parameters stay where they are, in prior standard deviations from neutral."""
     model, about, mechanism, first = beside.model, beside.about, problem.mechanisms[-1], len(beside.about.point)
     p, rows = _by_size(problem, about, shape)
     visibility = _visibility(rows, mechanism, beside.factors, beside.sizes.errors)

@@ -45,8 +45,8 @@ WAYS = 8  # in which an effect of these may act too, at most, those that screeni
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Everything tried: the model without effects, all hypotheses with the best first, what screening said, and which effects of the catalogue
-    are a free form's own change with a law; `by_resonances` is what light resonances gain in ln evidence without effects."""
+    """Everything tried: the model without effects, all hypotheses with the best first, what screening said, and which effects of the
+    catalogue are a free form's own change with a law; `by_resonances` is what light resonances gain in ln evidence without effects."""
 
     model: CampaignModel
     base: Hypothesis
@@ -63,8 +63,8 @@ def search(
     model: CampaignModel, named: Sequence[Mechanism], free: Sequence[Mechanism], progress: Callable[[str], None] = lambda done: None,
     workers: int | None = None,
 ) -> Search:
-    """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
-    one; and one that moves with temperature where no effect alone explains them, and it explains more."""
+    """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or
+    beside the best single one; and one that moves with temperature where no effect alone explains them, and it explains more."""
     with meanwhile(partial(with_own_laws, named, model.spindle, [d.condition for d in model.tests]), workers) as own_laws:
         none = _without_effects(model)
         if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
@@ -124,7 +124,8 @@ def _without_effects(model: CampaignModel) -> Hypothesis:
 
 
 def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:
-    """The model without effects, fitted on from the best explanation that explains more with effects of no size in any test: then it had stalled."""
+    """The model without effects, fitted on from the best explanation that explains more with
+    effects of no size in any test: then it had stalled."""
     idle = [h for h in ended if h.evidence.ln > none.evidence.ln + OCCAM and all(h.idle)]
     if not idle:
         return none
@@ -157,8 +158,8 @@ def _settled_at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hyp
 
 
 def _from_the_drawing(model: CampaignModel, h: Hypothesis) -> Hypothesis:
-    """Once more with no tolerance off its drawing: a shape that went where tolerances were strained may lie in a valley of its own, where these hold it. A disk of 3 g and 12.5 mm was found as one
-    of 3.9 +- 0.02 g and 15 mm, 80 in chi2 behind."""
+    """Once more with no tolerance off its drawing: a shape that went where tolerances were strained may lie in a valley of
+    its own, where these hold it. A disk of 3 g and 12.5 mm was found as one of 3.9 +- 0.02 g and 15 mm, 80 in chi2 behind."""
     try:
         again = fit(model, h.mechanisms, as_drawn(model, h.fit.point), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved, beaten=h.fit.cost)
         found = Hypothesis(again, evidence(model, again))
@@ -168,8 +169,9 @@ def _from_the_drawing(model: CampaignModel, h: Hypothesis) -> Hypothesis:
 
 
 def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Sequence[Mechanism], tried: Singles, workers: int | None) -> list[Hypothesis]:
-    """The best explanation of the catalogue, and those that do nearly as well, with each of their effects acting in every other way that it has (the other bearing, the other ideal case of its
-    law; by each law of its own where it has the data's): screening chose one, and what the data do not tell of that is not to be told as if they did. Not where one effect less, or none, does as well."""
+    """The best explanation of the catalogue, and those that do nearly as well, with each of their effects acting in every other way
+    that it has (the other bearing, the other ideal case of its law; by each law of its own where it has the data's): screening chose
+    one, and what the data do not tell of that is not to be told as if they did. Not where one effect less, or none, does as well."""
     named = of_each_name([h for h in ranked if h.mechanisms and not h.free])
     best = max((h.evidence.ln for h in ranked), default=-np.inf)
     less = [*named, *(h for h in ranked if not h.mechanisms)]
@@ -216,7 +218,8 @@ def _finalists(found: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:
-    """Of every free form in a hypothesis the effects in others that change the same, with the shapes that they were fitted, and could by another law."""
+    """Of every free form in a hypothesis the effects in others that change the same, with the
+    shapes that they were fitted, and could by another law."""
     fitted = [(m, shape) for h in reversed(hypotheses) for m, shape in zip(h.mechanisms, h.fit.shapes, strict=True)]  # the best one's last
     every = {m.name: (m, shape) for m, shape in fitted}
     free, named = ([row for row in every.values() if row[0].free == kind] for kind in (True, False))

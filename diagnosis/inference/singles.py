@@ -2,9 +2,9 @@
 
 Screening is linear: what each mechanism would do to every line in every test, beside all that nuisances can do, gives the evidence that it
 would have. Where tolerances leave a misfit, it is done while errors are still taken 30 times too large, before tolerances are dragged off
-to fit what they cannot; where these follow the peaks all the same, or modes that drift explain it, also with the errors as they are and as if none did (a delay of 1 us in one channel of blind campaign
-2448, beside leakage that left errors 6 % larger, promised 2700 in ln evidence there and nothing before). What falls behind there is not fitted further (successive
-halving: Jamieson & Talwalkar, AISTATS 2016).
+to fit what they cannot; where these follow the peaks all the same, or modes that drift explain it, also with the errors as they are and as
+if none did (a delay of 1 us in one channel of blind campaign 2448, beside leakage that left errors 6 % larger, promised 2700 in ln
+evidence there and nothing before). What falls behind there is not fitted further (successive halving: Jamieson & Talwalkar, AISTATS 2016).
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ STRAINED = 4.0  # standard deviations of a build tolerance, from which likewise
 
 @dataclass(frozen=True, eq=False)
 class Singles:
-    """Mechanisms one at a time: those fitted, what screening said of all, what priors pairs are fitted with and the cost they should reach; and the fits
-    while errors were still enlarged, where they were."""
+    """Mechanisms one at a time: those fitted, what screening said of all, what priors pairs are fitted
+    with and the cost they should reach; and the fits while errors were still enlarged, where they were."""
 
     singles: list[Hypothesis]
     screened: tuple[Screened, ...]
@@ -98,15 +98,16 @@ def strained(h: Hypothesis) -> bool:
 
 
 def far_off(model: CampaignModel, about: Fit) -> bool:
-    """Whether a fit with errors still enlarged leaves peaks off by many of their widths; a table's frequencies follow their parameters as far as these go."""
+    """Whether a fit with errors still enlarged leaves peaks off by many of their widths; a table's
+    frequencies follow their parameters as far as these go."""
     return any(isinstance(d, LineData) for d in model.tests) and about.temper * np.sqrt(about.chi2 / about.count) > STALLED
 
 
 def _owed(
     model: CampaignModel, none: Hypothesis, looked: Sequence[Screened], singles: Sequence[Hypothesis], most: float, expected: Learned, workers
 ) -> list[Hypothesis]:
-    """Fits of what screening beside the model whose modes drift promised, and what fits from enlarged errors on have not delivered: some of these ended
-    early there, or stalled."""
+    """Fits of what screening beside the model whose modes drift promised, and what fits from
+    enlarged errors on have not delivered: some of these ended early there, or stalled."""
     nothing = evidence(model, none.fit, [undrifted(none.evidence.learned)]).ln
     delivered: dict[str, float] = {}
     for h in singles:
@@ -133,9 +134,9 @@ def _keeping_up(model: CampaignModel, tasks: Sequence[Task], beside: Hypothesis,
 
 
 def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanisms: Sequence[Mechanism], workers) -> list[Hypothesis]:
-    """Effects with laws of the data's own, fitted from what the best free form says. Where that does better than an effect which changes much the same by the
-    law assumed, the effect may do as well by another; screening, which is linear, need not have seen it. Not where that is far behind the best; and to the end what keeps up
-    while errors are still enlarged."""
+    """Effects with laws of the data's own, fitted from what the best free form says. Where that does better than an effect
+    which changes much the same by the law assumed, the effect may do as well by another; screening, which is linear, need
+    not have seen it. Not where that is far behind the best; and to the end what keeps up while errors are still enlarged."""
     told = max((h for h in tried.singles if h.free), key=lambda h: h.evidence.ln, default=none)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
     if not told.free or told.evidence.ln < max(none.evidence.ln + PLENTY, best.evidence.ln - FAR):
@@ -170,9 +171,9 @@ def carried_over(model: CampaignModel, none: Hypothesis, tried: Singles, before:
 def lasting(
     model: CampaignModel, lead: Hypothesis, mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers
 ) -> list[Hypothesis]:
-    """Effects that are the same in every test beside an explanation, from a scan of sizes with all else as drawn: constant discrepancies of the model
-    or strained tolerances stand in for them, and beside those screening sees nothing. Followed to the end is what gains something while errors are
-    still enlarged."""
+    """Effects that are the same in every test beside an explanation, from a scan of sizes with all else as
+    drawn: constant discrepancies of the model or strained tolerances stand in for them, and beside those
+    screening sees nothing. Followed to the end is what gains something while errors are still enlarged."""
     n = len(model.parameters)
     if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean) < STRAINED:
         return []
@@ -191,7 +192,8 @@ def lasting(
 
 
 def farthest_tolerance(model: CampaignModel, point: Array) -> float:
-    """How far, in its standard deviations, the build tolerance is that is farthest off in a parameter vector (n,); nothing where there are none."""
+    """How far, in its standard deviations, the build tolerance is that is farthest off in a
+    parameter vector (n,); nothing where there are none."""
     return max((abs(float(v)) for q, v in zip(model.parameters, point, strict=False) if q.kind == kinds_of.BUILD), default=0.0)
 
 
@@ -211,16 +213,16 @@ def of_each_name(found: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def task_of(lead: tuple[Mechanism, ...], about: Fit, s: Screened, hoped: float, far: bool) -> Task:
-    """A screened mechanism beside those of the fit `about`: from there with its size, and with `far` from where screening says it leads or from
-    there without it."""
+    """A screened mechanism beside those of the fit `about`: from there with its size, and with
+    `far` from where screening says it leads or from there without it."""
     own = s.start[len(about.point) :]
     starts = (s.start, np.concatenate([about.point, 0 * own])) if far else (np.concatenate([about.point, own]),)
     return Task((*lead, s.mechanism), starts, hoped)
 
 
 def promising(looked: Sequence[Screened], kind: str) -> list[Screened]:
-    """The best variant of every mechanism of one kind, with the most promising first; of those with laws of the data's own only what promises more than the
-    law that is assumed, at sizes that can be."""
+    """The best variant of every mechanism of one kind, with the most promising first; of those with
+    laws of the data's own only what promises more than the law that is assumed, at sizes that can be."""
     by_law = {s.mechanism.name: s.gain for s in sorted(looked, key=lambda s: s.gain) if s.mechanism.kind == "law"}
     best: dict[str, Screened] = {}
     for s in sorted((s for s in looked if s.mechanism.kind == kind and np.isfinite(s.gain)), key=lambda s: -s.gain):
@@ -230,8 +232,8 @@ def promising(looked: Sequence[Screened], kind: str) -> list[Screened]:
 
 
 def _chosen(rankings: Sequence[Sequence[Screened]], misfit: bool) -> list[Screened]:
-    """The most promising mechanisms of every kind, from all rankings by turns. Where there is no misfit what screening promises is nearly what a fit will
-    hold, and only what is near the best is followed."""
+    """The most promising mechanisms of every kind, from all rankings by turns. Where there is no misfit
+    what screening promises is nearly what a fit will hold, and only what is near the best is followed."""
     found: list[Screened] = []
     for kind, most in MOST.items():
         followed = []
@@ -251,8 +253,10 @@ def _chosen(rankings: Sequence[Sequence[Screened]], misfit: bool) -> list[Screen
 def _from_scan(
     model: CampaignModel, about: Fit, looked: Sequence[Screened], chosen: Collection[tuple[str, str]], most: float, expected: Learned, workers
 ) -> list[Screened]:
-    """What is missing among those `chosen`: where peaks are off by many of their widths, what is linear says little of what moves them. Mechanisms that a scan of sizes says most of are fitted with errors
-    enlarged most, where all peaks move together, and the best of each kind follow (a flange that softened by 14 % in blind campaign 2316 was not among the first ten that screening promised, and led there)."""
+    """What is missing among those `chosen`: where peaks are off by many of their widths, what is linear
+    says little of what moves them. Mechanisms that a scan of sizes says most of are fitted with errors
+    enlarged most, where all peaks move together, and the best of each kind follow (a flange that softened
+    by 14 % in blind campaign 2316 was not among the first ten that screening promised, and led there)."""
     found: list[Screened] = []
     for kind, count in SCANNED.items():
         ways = {s.mechanism.name: s for s in reversed(looked) if s.mechanism.kind == kind and s.visibility > 0}  # the first of each, which has all its shape
@@ -274,7 +278,8 @@ def _scanned(model: CampaignModel, expected: Learned, m: Mechanism) -> tuple[flo
 def fitted_in_steps(
     model, tasks: Sequence[Task], first: Collection[str], about: Fit, most: float, expected: Learned, workers
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """All tasks fitted in steps of temper, from scans too where peaks are far off, after which what fell behind is left, but for those that promised most at `first` as long as none explains the data: the first of two causes that
+    """All tasks fitted in steps of temper, from scans too where peaks are far off, after which what fell behind is
+    left, but for those that promised most at `first` as long as none explains the data: the first of two causes that
     shows while errors are enlarged need not be the one that tells more. Those that arrived, and all of the first step."""
     alive, afresh, early, found = list(tasks), far_off(model, about), list[Hypothesis](), list[Hypothesis]()
     count, beaten = sum(d.count for d in model.tests), np.inf  # a thinned model's lines weigh as much as all

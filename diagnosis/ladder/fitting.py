@@ -1,4 +1,5 @@
-"""Fits of the ladder: a model beside all tests, and beside all but a part of them (`diagnosis.ladder.left_out`), which it then has to predict.
+"""Fits of the ladder: a model beside all tests, and beside all but a part of them
+(`diagnosis.ladder.left_out`), which it then has to predict.
 
 Both are fitted afresh, from the drawing and with errors enlarged at first, so that nothing of a test left out is in the fit that predicts
 it. Unlike in `diagnose`, no mode may drift freely from test to test: what drifts is what the steps of the ladder are to explain.
@@ -39,7 +40,8 @@ def without(model: CampaignModel, kinds: Sequence[str]) -> CampaignModel:
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """A fit with every discrepancy at the size that the data ask for, as `learned`; `first` is the fit at the reference sizes from which it went on."""
+    """A fit with every discrepancy at the size that the data ask for, as `learned`; `first` is the
+    fit at the reference sizes from which it went on."""
 
     model: CampaignModel
     fit: Fit
@@ -66,10 +68,11 @@ class Settled:
 
     @cached_property
     def posterior(self) -> tuple[Array, Array]:
-        """Mean (n,) and covariance (n, n) of all parameters, with the width and the departure from its law that were learned of every effect.
+        """Mean (n,) and covariance (n, n) of all parameters, with the width and the departure from
+        its law that were learned of every effect.
 
-        These move the mean away from where the fit stands; where the quadratic of an effect does not hold so far, or no spindle can be built
-        there, the fit itself is taken, with its wider priors.
+        These move the mean away from where the fit stands; where the quadratic of an effect does not
+        hold so far, or no spindle can be built there, the fit itself is taken, with its wider priors.
         """
         there = Problem(self.model, self.mechanisms).residuals(self.evidence.mean)
         if there is None or (self.mechanisms and sum(float(r @ r) for r in there) > HOLDS * self.evidence.chi2):
@@ -144,7 +147,8 @@ def _cost(found: Fit) -> float:
 
 
 def _at_learned(model: CampaignModel, first: Fit) -> Settled:
-    """The fit gone on with every discrepancy at the size that makes the data likeliest, instead of the reference size; errors and tolerances are as stated.
+    """The fit gone on with every discrepancy at the size that makes the data likeliest, instead of
+    the reference size; errors and tolerances are as stated.
 
     Far from the reference the quadratic about the fit is not to be trusted: a model that misses frequencies by a hundredth shifts peaks
     by more than their width.

@@ -100,7 +100,8 @@ AS_DRAWN, EULER_BERNOULLI = "as drawn", "Euler-Bernoulli beam"
 
 
 def forms_of(spindle: Spindle) -> tuple[Form, ...]:
-    """The forms in which models of this spindle differ: of one without rolling bearings, which no thermal motion changes, there is one, as drawn."""
+    """The forms in which models of this spindle differ: of one without rolling bearings, which no
+    thermal motion changes, there is one, as drawn."""
     if spindle.rolling:
         return FORMS
     shafts = spindle.structure.shafts

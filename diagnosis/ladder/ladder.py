@@ -6,9 +6,9 @@ tolerances are fitted, with the measuring errors; then what the model misses at 
 learned; then effects join, everything fitted anew with each. Whoever adds an effect that the data do not ask for sees that the error stays
 where it was and the evidence falls. Where effects are not chosen by hand they are those that `diagnose` names.
 
-Of tables measured at one condition a constant discrepancy could be everything: there it is a step beside the others, and effects stand on the fitted
-tolerances. Where a shaft's beam then lacks something, effects not chosen by hand begin with what it lacks, in the order in which beams took it in, and
-the mass of the sensors (`BEAM`).
+Of tables measured at one condition a constant discrepancy could be everything: there it is a step beside the
+others, and effects stand on the fitted tolerances. Where a shaft's beam then lacks something, effects not chosen
+by hand begin with what it lacks, in the order in which beams took it in, and the mass of the sensors (`BEAM`).
 
 Every fit is that of `diagnosis.inference`; the error of a temperature left out, or of a mode, is that of a fit which never saw it
 (`diagnosis.ladder.left_out`).
@@ -54,7 +54,8 @@ Asked = tuple[str, tuple[Effect, ...], str]
 
 @dataclass(frozen=True, eq=False)
 class Ladder:
-    """Steps in the order in which they were climbed, and the modes that were measured. `left_out` is what fits predict unseen: temperatures, or modes.
+    """Steps in the order in which they were climbed, and the modes that were measured. `left_out`
+    is what fits predict unseen: temperatures, or modes.
 
     `forms`: every model form with all tolerances and the constant discrepancy free: (name, error, held-out error, evidence), the held-out
     error NaN for the earlier forms beside FRF lines. `diagnosis` and its next `tests` where effects were not chosen by hand.
@@ -80,7 +81,8 @@ class Ladder:
 
     @property
     def top(self) -> Step:
-        """Where the ladder leads: the last step, the best of alternatives and of what a beam lacks that is asked for, or that without effects where none is accepted."""
+        """Where the ladder leads: the last step, the best of alternatives and of what a beam lacks
+        that is asked for, or that without effects where none is accepted."""
         word = "" if self.diagnosis is None else self.diagnosis.verdict.word
         if word in ("none", "unexplained"):
             return self.step(DISCREPANCY)
@@ -164,7 +166,8 @@ def _lacking(spindle: Spindle, catalogue: tuple[Effect, ...]) -> list[Effect]:
 
 @dataclass(frozen=True, eq=False)
 class Fits:
-    """One model fitted to `whole`, all tests, and to all but each group of them: `partial`, with how far each of these fits is from its group."""
+    """One model fitted to `whole`, all tests, and to all but each group of them: `partial`, with
+    how far each of these fits is from its group."""
 
     whole: Settled
     partial: tuple[tuple[Settled, Missed], ...]

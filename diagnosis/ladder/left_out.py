@@ -1,7 +1,9 @@
-"""What is left out of a fit, which then has to predict it: the tests of one condition, or, where all were made at one, some modes of the tables.
+"""What is left out of a fit, which then has to predict it: the tests of one condition, or, where
+all were made at one, some modes of the tables.
 
-At one condition nothing but other modes can tell of a mode, and what the model misses constantly may be anything there: a mode left out is what tells a
-missing effect from a constant error of every frequency. Modes that nearly coincide, as the two planes of a shaft do, are left out together.
+At one condition nothing but other modes can tell of a mode, and what the model misses constantly
+may be anything there: a mode left out is what tells a missing effect from a constant error of every
+frequency. Modes that nearly coincide, as the two planes of a shaft do, are left out together.
 """
 
 from __future__ import annotations
@@ -34,8 +36,8 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Missed:
-    """How far a fit is from what it has not seen: squares and number of the residuals in standard errors of its prediction, and squares and number of
-    the relative errors of the frequencies of tables."""
+    """How far a fit is from what it has not seen: squares and number of the residuals in standard errors
+    of its prediction, and squares and number of the relative errors of the frequencies of tables."""
 
     squares: float = 0.0
     count: int = 0
@@ -83,8 +85,9 @@ def _without(model: CampaignModel, t: int, group: LeftOut) -> TestData:
 def missed(found: Settled, tests: Sequence[TestData], group: LeftOut) -> Missed:
     """How far `found`, which has not seen a group, is from it in `tests`.
 
-    With r the residuals there in standard errors of the data, J their derivatives by all parameters and S = R R^T the covariance of these, the squares are
-    r (1 + J S J^T)^-1 r, the least that |r - J R z|^2 + |z|^2 can be: what is not known of the left-out test itself (its temperature, its gains) is part of S, with its prior.
+    With r the residuals there in standard errors of the data, J their derivatives by all parameters and S = R
+    R^T the covariance of these, the squares are r (1 + J S J^T)^-1 r, the least that |r - J R z|^2 + |z|^2 can
+    be: what is not known of the left-out test itself (its temperature, its gains) is part of S, with its prior.
     They are found as those, for of a test that the fit is far from they are a small difference of large numbers.
     """
     model = replace(found.model, tests=tuple(tests))

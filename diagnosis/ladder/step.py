@@ -21,8 +21,8 @@ TEMPERATURE_APART = 0.5  # K, from which two tests show a shift
 
 @dataclass(frozen=True, eq=False)
 class MeasuredModes:
-    """All measured modes of a campaign, one row (n,) each: number of the test, number of the computed mode (0: none), natural frequency (Hz) and
-    damping ratio (NaN: not measured) with standard errors. `kinds` of the computed modes by number."""
+    """All measured modes of a campaign, one row (n,) each: number of the test, number of the computed mode (0: none), natural
+    frequency (Hz) and damping ratio (NaN: not measured) with standard errors. `kinds` of the computed modes by number."""
 
     observations: tuple[Observation, ...]
     test: Array
@@ -38,13 +38,13 @@ class MeasuredModes:
 class Step:
     """One model beside all data.
 
-    `error` and `held_out` are rms residuals: of all data in their standard errors, and of each temperature predicted from the others, at one condition of
-    each mode, in standard errors of that prediction (with nothing fitted there is nothing to leave out, and the two are the same);
-    `held_out_percent` are the frequencies of tables predicted so, NaN without any. `frequency` and `damping` (n,)
-    are computed for every measured mode, NaN without a partner; `rms_Hz` and `rms_percent` are of frequencies, `rms_shift_Hz` the error of
-    the shifts from the coldest test of each speed, None without a second temperature. `stretch` is the rms of the fitted tolerances in their
-    own standard deviations: about one or less is believable, and a small error with a large stretch is bought, not explained. `evidence`
-    is ln, on one scale for all steps. `lost_contact` says of which tests.
+    `error` and `held_out` are rms residuals: of all data in their standard errors, and of each temperature predicted from the
+    others, at one condition of each mode, in standard errors of that prediction (with nothing fitted there is nothing to leave
+    out, and the two are the same); `held_out_percent` are the frequencies of tables predicted so, NaN without any. `frequency`
+    and `damping` (n,) are computed for every measured mode, NaN without a partner; `rms_Hz` and `rms_percent` are of frequencies,
+    `rms_shift_Hz` the error of the shifts from the coldest test of each speed, None without a second temperature. `stretch` is
+    the rms of the fitted tolerances in their own standard deviations: about one or less is believable, and a small error with a
+    large stretch is bought, not explained. `evidence` is ln, on one scale for all steps. `lost_contact` says of which tests.
     """
 
     name: str
@@ -99,7 +99,8 @@ def _of_table(computed: Array, measured: Array, sd: Array) -> float:
 
 
 def fitted(found: Settled, measured: MeasuredModes, name: str, held_out: tuple[float, float], above: str) -> Step:
-    """A fit of tolerances and effects, beside the scene's own effects, and how far what is `held_out` is missed: in standard errors, in per cent."""
+    """A fit of tolerances and effects, beside the scene's own effects, and how far what is
+    `held_out` is missed: in standard errors, in per cent."""
     applied = [found.applied(t) for t in range(len(found.model.tests))]
     error = float(np.sqrt(found.fit.chi2 / found.fit.count))
     names = tuple(m.name for m in found.mechanisms)

@@ -17,8 +17,8 @@ Dof = tuple[str, str]
 
 @dataclass(frozen=True)
 class MassTerm:
-    """How bodies may have their mass otherwise than drawn: what the whole of it adds to M at two degrees of freedom (kg, kg m, kg m2), to polar inertias by body (kg m2), and one standard deviation of the
-    share of it that is there."""
+    """How bodies may have their mass otherwise than drawn: what the whole of it adds to M at two degrees of freedom
+    (kg, kg m, kg m2), to polar inertias by body (kg m2), and one standard deviation of the share of it that is there."""
 
     name: str
     sd: float
@@ -27,7 +27,8 @@ class MassTerm:
 
 
 def mass_terms(spindle: Spindle) -> tuple[MassTerm, ...]:
-    """What the toleranced parameters leave as drawn of the mass of rigid bodies and of shafts. A hub whose polar inertia was off by two thousandths beside the other had a disk on it, 30 in ln evidence."""
+    """What the toleranced parameters leave as drawn of the mass of rigid bodies and of shafts. A hub
+    whose polar inertia was off by two thousandths beside the other had a disk on it, 30 in ln evidence."""
     rigid = [m for b in spindle.structure.rigid_bodies for m in _of_a_body(b, spindle)]
     shafts = [m for s in spindle.structure.shafts for m in _of_a_shaft(s, spindle)]
     return tuple(m for m in (*rigid, *shafts) if m.entries or m.polar)
@@ -58,8 +59,8 @@ def _of_a_body(body: Body, spindle: Spindle) -> list[MassTerm]:
 
 
 def _of_a_shaft(shaft: Shaft, spindle: Spindle) -> list[MassTerm]:
-    """Of one that turns, on which a drawing lumps rotor, nuts and tool: more mass towards its end, and in its middle less than at both; and polar inertia beside the other. One that stands still is of
-    one piece, with the tolerance of its density."""
+    """Of one that turns, on which a drawing lumps rotor, nuts and tool: more mass towards its end, and in its middle less than
+    at both; and polar inertia beside the other. One that stands still is of one piece, with the tolerance of its density."""
     if not shaft.turns:
         return []
     sd, nodes = spindle.tolerances.hub, [spindle.structure.body(name) for name in shaft.bodies]

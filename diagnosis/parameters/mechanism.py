@@ -1,12 +1,12 @@
 """A mechanism and its law: what is changed, where, and how much of it is expected over temperature, speed, level and time.
 
-The size of an effect is its first parameter. Its law is what the effect's formula makes of one size at every condition. A law is a prior,
-not a gospel: the size that acts in test t is a_t = a (1 + r_t), with departures r that are continuous over the conditions (an
-exponential covariance, Rasmussen & Williams, *Gaussian Processes*, 2006, Eq. 4.18) and whose size is learned. Where a law gives nothing it
-goes on giving nothing; with a law of the data's own the same mechanism acts in every test as its formula has it where it does most, and its
-size alone says how much. What drifts begins at the reference: where a formula gives nothing there, a law of the data's own does not either, and what is
-the same in all tests is an offset of the drawing. Beyond a limit of its size the matrices of an effect continue in a straight line, so that sizes may
-scatter about zero.
+The size of an effect is its first parameter. Its law is what the effect's formula makes of one size at every condition. A law
+is a prior, not a gospel: the size that acts in test t is a_t = a (1 + r_t), with departures r that are continuous over the
+conditions (an exponential covariance, Rasmussen & Williams, *Gaussian Processes*, 2006, Eq. 4.18) and whose size is learned.
+Where a law gives nothing it goes on giving nothing; with a law of the data's own the same mechanism acts in every test as its
+formula has it where it does most, and its size alone says how much. What drifts begins at the reference: where a formula
+gives nothing there, a law of the data's own does not either, and what is the same in all tests is an offset of the drawing.
+Beyond a limit of its size the matrices of an effect continue in a straight line, so that sizes may scatter about zero.
 """
 
 from __future__ import annotations
@@ -42,9 +42,10 @@ REFERENCE_WIDTH = 2.0  # prior standard deviations of the size, likewise
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """An effect with its choices made; `free` for free-form models, which have no law and no name in the catalogue, `own_law` for effects of the
-    catalogue whose law is the data's own. Sizes of one that has a `reference` grow from there, where it does nothing; those of the others start from one that all tests
-    share. One that is `beyond` changes what an effect does, by sizes that this cannot have: something unknown, and free."""
+    """An effect with its choices made; `free` for free-form models, which have no law and no name in the
+    catalogue, `own_law` for effects of the catalogue whose law is the data's own. Sizes of one that has a
+    `reference` grow from there, where it does nothing; those of the others start from one that all tests share.
+    One that is `beyond` changes what an effect does, by sizes that this cannot have: something unknown, and free."""
 
     effect: Effect
     choices: Mapping[str, float]
@@ -82,8 +83,8 @@ class Mechanism:
 
 
 def variants(effect: Effect) -> list[Mechanism]:
-    """One mechanism for every combination of what an effect has to choose from; and, of each share between two ideal cases, both of these beside
-    what lies between, for the first combination: a law that is all constant, or all thermal, has nothing to choose."""
+    """One mechanism for every combination of what an effect has to choose from; and, of each share between two ideal cases, both of
+    these beside what lies between, for the first combination: a law that is all constant, or all thermal, has nothing to choose."""
     chosen = [p for p in effect.parameters[1:] if p.choices]
     shape = tuple(p for p in effect.parameters[1:] if not p.choices and p.prior_sd > 0)
     found = []
@@ -97,8 +98,8 @@ def variants(effect: Effect) -> list[Mechanism]:
 
 
 def strongest(spindle: Spindle, conditions: Sequence[Condition]) -> Condition:
-    """Where effects do most, of all that tests were made at together: the temperature furthest from the reference, the highest speed (the nominal one
-    where nothing turned), the hardest hit and the shortest soak."""
+    """Where effects do most, of all that tests were made at together: the temperature furthest from the
+    reference, the highest speed (the nominal one where nothing turned), the hardest hit and the shortest soak."""
     furthest = max((c.temperature for c in conditions), key=lambda t: abs(t - spindle.reference_temperature))
     fastest = max((c.speed for c in conditions), key=abs) or spindle.nominal_speed
     return Condition(furthest, fastest, max(c.level for c in conditions), min(c.soak_time for c in conditions))
@@ -110,9 +111,10 @@ def unmoved(spindle: Spindle, conditions: Sequence[Condition]) -> Condition:
 
 
 def with_own_laws(mechanisms: Sequence[Mechanism], spindle: Spindle, conditions: Sequence[Condition]) -> list[Mechanism]:
-    """The same with laws of the data's own: every effect does at any condition what its formula gives where it does most, and what gives nothing at the reference
-    grows from there. Of what lies between two ideal cases of a
-    law one serves for all, and what there is but another size is no shape; what lasts, or asks for no condition, has no law but a constant, what is `exact` no other, and what changes the condition cannot be asked at another."""
+    """The same with laws of the data's own: every effect does at any condition what its formula gives where it
+    does most, and what gives nothing at the reference grows from there. Of what lies between two ideal cases of a
+    law one serves for all, and what there is but another size is no shape; what lasts, or asks for no condition,
+    has no law but a constant, what is `exact` no other, and what changes the condition cannot be asked at another."""
     at, reference, changes = strongest(spindle, conditions), unmoved(spindle, conditions), _changes_of(spindle)
     found: dict[tuple, Mechanism] = {}
     for m in mechanisms:
@@ -138,7 +140,8 @@ def asked_at(effect: Effect, at: Any) -> Effect:
 
 
 def _changes_of(spindle: Spindle) -> Changes:
-    """What an effect changes at a condition beside those of the scene, in shares of the largest entry of each matrix; what is without it is worked out once a condition."""
+    """What an effect changes at a condition beside those of the scene, in shares of the largest
+    entry of each matrix; what is without it is worked out once a condition."""
     present, plain = of_scene(spindle), cache(lambda at: operating_point(spindle, at).linear)
 
     def changes(at: Condition, effect: Effect, values: Mapping[str, float]) -> Array:
@@ -149,8 +152,8 @@ def _changes_of(spindle: Spindle) -> Changes:
 
 
 def _without_scales(m: Mechanism, changes: Changes, at: Condition) -> Mechanism:
-    """Without the shape parameters that do no more than a size does where one condition alone is asked: a law's, such as the interference by which a fit
-    opens with temperature. They stay where they are neutral."""
+    """Without the shape parameters that do no more than a size does where one condition alone is asked: a
+    law's, such as the interference by which a fit opens with temperature. They stay where they are neutral."""
     try:
         neutral = m.values(m.size.neutral + LITTLE * (m.size.typical - m.size.neutral), [q.neutral for q in m.shape])
         drawn = changes(at, m.effect, neutral)
@@ -206,7 +209,8 @@ def _asks(effect: Effect, spindle: Spindle, at: Condition) -> bool:
 
 
 def _places(conditions: Sequence[Condition]) -> Array:
-    """Temperature, speed, ln level and ln soak time (4, n), each over the distance within which departures are alike; heat and loads of balls know no sense of rotation."""
+    """Temperature, speed, ln level and ln soak time (4, n), each over the distance within which
+    departures are alike; heat and loads of balls know no sense of rotation."""
     t = np.array([c.temperature for c in conditions]) / MEMORY_K
     n = np.array([abs(c.speed) for c in conditions]) / (MEMORY_RPM * RPM)
     level = np.log(np.maximum([c.level for c in conditions], 0.1)) / MEMORY_LEVEL
@@ -215,7 +219,8 @@ def _places(conditions: Sequence[Condition]) -> Array:
 
 
 def likeness(conditions: Sequence[Condition], others: Sequence[Condition] | None = None) -> Array:
-    """Correlation (n, m) of departures from a law between tests, and the same or `others`: 1 where conditions agree, falling with their distance."""
+    """Correlation (n, m) of departures from a law between tests, and the same or `others`: 1 where
+    conditions agree, falling with their distance."""
     one, other = _places(conditions), _places(conditions if others is None else others)
     return np.exp(-np.abs(one[:, :, None] - other[:, None, :]).sum(axis=0))
 
@@ -226,7 +231,8 @@ def grown(conditions: Sequence[Condition], reference: Condition) -> Array:
 
 
 def shared(m: Mechanism, conditions: Sequence[Condition]) -> Array:
-    """Of one size of a mechanism how much (n,) every test has where its law holds: all of it, or what has grown from its reference, 1 at most."""
+    """Of one size of a mechanism how much (n,) every test has where its law holds: all of it, or
+    what has grown from its reference, 1 at most."""
     if m.reference is None:
         return np.ones(len(conditions))
     amounts = grown(conditions, m.reference).sum(axis=0)
@@ -234,9 +240,9 @@ def shared(m: Mechanism, conditions: Sequence[Condition]) -> Array:
 
 
 def size_covariance(conditions: Sequence[Condition], width: float, departure: float, offset: float = 1.0, reference: Condition | None = None) -> Array:
-    """Prior covariance (n, n) of the sizes in all tests, with a little of each test's own: `width`^2 (`offset`^2 + `departure`^2 likeness); of what grows from
-    a `reference` `width`^2 (`offset`^2 + what grows straight, for each of temperature, speed, level and soak + `departure`^2 times the covariance of x - x there,
-    x having the likeness)."""
+    """Prior covariance (n, n) of the sizes in all tests, with a little of each test's own: `width`^2 (`offset`^2 +
+    `departure`^2 likeness); of what grows from a `reference` `width`^2 (`offset`^2 + what grows straight, for each of
+    temperature, speed, level and soak + `departure`^2 times the covariance of x - x there, x having the likeness)."""
     n = len(conditions)
     alike, straight = likeness(conditions), np.zeros((n, n))
     if reference is not None:
@@ -247,7 +253,8 @@ def size_covariance(conditions: Sequence[Condition], width: float, departure: fl
 
 
 def one_size(m: Mechanism, root: Array, sizes: Array, covariance: Array) -> tuple[float, float]:
-    """One size for all tests, with its standard error, within its limits: of `sizes` (tests,) with their `covariance`, weighted by what the data tell beyond the prior whose `root` (tests, tests) that is.
+    """One size for all tests, with its standard error, within its limits: of `sizes` (tests,) with their
+    `covariance`, weighted by what the data tell beyond the prior whose `root` (tests, tests) that is.
 
     A test at the reference, where what grows from it is nothing by its definition, tells nothing.
     """

@@ -3,19 +3,21 @@
 Every nuisance parameter is counted in its own prior standard deviations, so that all priors are N(0, 1) at the reference widths.
 
 `stiffness discrepancy` and `damping discrepancy` are the model's own constant errors (Kennedy & O'Hagan, *J. R. Statist. Soc. B* 63
-(2001) 425), as a random symmetric matrix in the coordinates of the reference modes (Soize, *Probab. Eng. Mech.* 15 (2000) 277):
-K + sum_ij e_ij w_i w_j (M f_i)(M f_j)^T with mass-normalised modes f of the reference condition. It is the same at every condition: it moves
-frequencies and mixes shapes, never their changes, and it is smooth where modes coincide. A drifting discrepancy is a much smaller one of each
-mode in each test: what laws that hold only nearly leave. The size of each is learned from the data.
+(2001) 425), as a random symmetric matrix in the coordinates of the reference modes (Soize, *Probab. Eng. Mech.* 15 (2000) 277): K +
+sum_ij e_ij w_i w_j (M f_i)(M f_j)^T with mass-normalised modes f of the reference condition. It is the same at every condition: it
+moves frequencies and mixes shapes, never their changes, and it is smooth where modes coincide. A drifting discrepancy is a much
+smaller one of each mode in each test: what laws that hold only nearly leave. The size of each is learned from the data.
 
-Bearings differ among themselves: each has a stiffness and a damping of its own about those that all share with the drawing, within the scene's tolerances. A
-constant discrepancy of modes cannot stand in for that: bearings soften with speed, and what one of two is off by with them. So it is with how stiff balls are along the axis and in
-tilt beside across it, in which two honest programs differ by a per cent or two: where the forces of a row are said to act, and what the races give. And what temperature does to a contact,
-and speed to its balls, is known as far as the model of a bearing holds: a little of it is wrong, as much as the data ask for, and not the same of each row. Balls orbit with their cage here,
-and each by itself in most programs.
+Bearings differ among themselves: each has a stiffness and a damping of its own about those that all share with the drawing,
+within the scene's tolerances. A constant discrepancy of modes cannot stand in for that: bearings soften with speed, and what one
+of two is off by with them. So it is with how stiff balls are along the axis and in tilt beside across it, in which two honest
+programs differ by a per cent or two: where the forces of a row are said to act, and what the races give. And what temperature
+does to a contact, and speed to its balls, is known as far as the model of a bearing holds: a little of it is wrong, as much as
+the data ask for, and not the same of each row. Balls orbit with their cage here, and each by itself in most programs.
 
-A light resonance is one that the drawing lacks, of the table, a fixture or a cable: an oscillator on some point of the machine, wherever that is, and so
-given by how much of it each reference mode carries along. It is looked for where the data show the same misfit in every test.
+A light resonance is one that the drawing lacks, of the table, a fixture or a cable: an oscillator
+on some point of the machine, wherever that is, and so given by how much of it each reference mode
+carries along. It is looked for where the data show the same misfit in every test.
 """
 
 from __future__ import annotations
@@ -38,42 +40,48 @@ COEFFICIENT, COEFFICIENT_SD = "coefficient of expansion", 0.01
 """Relative, of each material, the same at all temperatures: what tables give of one alloy differs by a per cent or two."""
 APART = "stiffness apart", "damping apart"  # of bearings
 HAMMER, HAMMER_DRIFT = "gain of a hammer", "drift of a hammer's gain"
-"""Of the force at each hammer's point, in all tests and from test to test: its calibration, and the cosine of how askew it hits (5 degrees are 0.4 %)."""
+"""Of the force at each hammer's point, in all tests and from test to test: its calibration, and the
+cosine of how askew it hits (5 degrees are 0.4 %)."""
 MISS, MISS_DRIFT, MISS_SD, MISS_DRIFT_SD = "miss of a hammer", "drift of a hammer's miss", 2e-4, 1e-4
-"""How far (m) from its point a hammer hits on the mean: in all tests, and from test to test at the reference width. By hand a tip meets its mark to some tenths of a millimetre, which
-at a radius of 12 mm is a per cent of the moment."""
+"""How far (m) from its point a hammer hits on the mean: in all tests, and from test to test at the reference width.
+By hand a tip meets its mark to some tenths of a millimetre, which at a radius of 12 mm is a per cent of the moment."""
 WAYS = ("outwards, or upwards on a side", "around the axis")
 PLACE, PLACE_SD = "place of a sensor", 3e-4
 """How far (m) a sensor sits from its point, the same in all tests: glued or aimed by eye, to some tenths of a millimetre."""
 ASKEW, ASKEW_SD = "direction of a sensor", 0.02
-"""By how much (rad) it is turned out of its direction, the same in all tests: a degree of glueing, and a transverse sensitivity of one to three per cent by accelerometers' data sheets (at most 5 %
-is usual), which is the same to an FRF."""
+"""By how much (rad) it is turned out of its direction, the same in all tests: a degree of glueing, and a transverse
+sensitivity of one to three per cent by accelerometers' data sheets (at most 5 % is usual), which is the same to an FRF."""
 LATE, LATE_SD = "delay of a channel", 2e-8
-"""How much later (s) it is than the force, the same in all tests: of modules made for it two channels differ by some thousandths of a degree a kHz, and by 0.045 (0.125 us) at most."""
+"""How much later (s) it is than the force, the same in all tests: of modules made for it two
+channels differ by some thousandths of a degree a kHz, and by 0.045 (0.125 us) at most."""
 BALLS = "stiffness of the balls"
 FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
-"""Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
-per cent, and forces by twice that (Harris, *Rolling Bearing Analysis*, 1991, ch. 8)."""
+"""Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both
+contact angles, the half sum) differ by some per cent, and forces by twice that (Harris, *Rolling Bearing Analysis*, 1991, ch. 8)."""
 BALLS_SD = 0.01  # in one direction beside that across the axis
 DIRECTIONS = (("axial", (2,)), ("tilt", (3, 4)))
 CHANGE, CHANGE_SD = "change of the balls' stiffness", 0.03
-"""Relative, at the reference width, of what the balls' inertia does to their stiffness at speed: where centrifugal force and gyroscopic moment are put, beside how large they are."""
+"""Relative, at the reference width, of what the balls' inertia does to their stiffness at speed:
+where centrifugal force and gyroscopic moment are put, beside how large they are."""
 CHANGES = ("across the axis", "along it and in tilt", "in tilt alone", "between tilt and moves across")
-"""How all rows may be off alike, by number, the last two at speed alone; each row by itself follows, by its number and theirs. Forces on heavy balls have no one line of action, and at what arm they tilt a
-ring programs differ in by a thousandth (of the front rows of an internal grinding spindle at 45,000 rpm 0.6e-3 and 1.6e-3, where moves agree to 1e-7)."""
+"""How all rows may be off alike, by number, the last two at speed alone; each row by itself follows, by its number and
+theirs. Forces on heavy balls have no one line of action, and at what arm they tilt a ring programs differ in by a
+thousandth (of the front rows of an internal grinding spindle at 45,000 rpm 0.6e-3 and 1.6e-3, where moves agree to 1e-7)."""
 WITHOUT_SPEED = 2  # of these
 CHANGE_APART = 0.3
 """Of it, of each row by itself: rows of other sizes and loads are not off by the same."""
 ORBITS, ORBITS_SD = "orbits of the balls", 1.0
-"""How far every ball orbits as fast as it rolls by itself (1), where here those of a row go with its cage (0): most programs have the one (Jones 1960), and no row is either. Of the front rows of an
+"""How far every ball orbits as fast as it rolls by itself (1), where here those of a row go with
+its cage (0): most programs have the one (Jones 1960), and no row is either. Of the front rows of an
 internal grinding spindle at 45,000 rpm it takes 5 % of the radial stiffness."""
 CONTACT_SD = 1e-3
-"""Relative, over `RANGE_K` and at the reference width of `CHANGE`, of what temperature does to the contact itself, beside the load on it. Two honest programs keep the contact's constant, or
-let its groove grow away from its ball: of ceramic balls in steel that is a thousandth."""
+"""Relative, over `RANGE_K` and at the reference width of `CHANGE`, of what temperature does to the
+contact itself, beside the load on it. Two honest programs keep the contact's constant, or let its
+groove grow away from its ball: of ceramic balls in steel that is a thousandth."""
 CONTACT_APART = 0.3  # of it, in each test by itself
 LAW, LAW_SD = "law of the damping", 1.0
-"""How far what is lost does not grow with frequency (1), where dampers lose in proportion to it (0), and loss factors are dampers of each mode here: programs in the frequency domain have a complex
-stiffness, and most structures and joints lose as one (Bishop 1955)."""
+"""How far what is lost does not grow with frequency (1), where dampers lose in proportion to it (0), and loss factors are dampers of
+each mode here: programs in the frequency domain have a complex stiffness, and most structures and joints lose as one (Bishop 1955)."""
 LAWS = ("loss factors", "dampers")
 UNEVEN = "stiffness of a joint uneven"  # about the axis
 MASSES = "distribution of mass"  # of a rigid body, where no tolerance holds it
@@ -86,7 +94,8 @@ STIFFNESS_SD = 1e-3  # relative error of a frequency at the reference width
 DAMPING_SD = 0.03  # relative error of a damping ratio at the reference width
 STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at the reference width
 ACTION, OF_CONDITIONS = "action of effects", "action of temperature and speed"
-"""No kinds of nuisances, but sizes that are learned: by what share effects, and temperature and speed by themselves, do to a mode other than the model says."""
+"""No kinds of nuisances, but sizes that are learned: by what share effects, and temperature and
+speed by themselves, do to a mode other than the model says."""
 UNWRITTEN = (BALLS, *APART, UNEVEN, MASSES, EXPANSION, COEFFICIENT, FLUNG, ORBITS, CHANGE, STIFFNESS_DRIFT, DAMPING_DRIFT)
 """How a spindle may differ from its drawing without a place in the table `build` of a scene."""
 DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
@@ -95,17 +104,18 @@ RESONANCE_SD = (0.02, 0.5)  # relative, of its frequency and of its damping rati
 DRIFTS_SD = {False: 0.005, True: 0.02}  # of what ln frequency changes by with temperature: of a table, and of one that was seen to move
 RANGE_K = 40.0  # over which that is told
 EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
-"""Relative errors of thermal motions, the same at all temperatures, at the reference width: two honest finite-element programs differ by a thousandth in the motions, and
-in whether a groove grows with its ring's free strain or follows its face. What a ball gives for a movement is off by a per cent or two, so that how wide they are is
-learned (`ODDS`)."""
+"""Relative errors of thermal motions, the same at all temperatures, at the reference width: two honest finite-element
+programs differ by a thousandth in the motions, and in whether a groove grows with its ring's free strain or follows
+its face. What a ball gives for a movement is off by a per cent or two, so that how wide they are is learned (`ODDS`)."""
 
 
 @dataclass(frozen=True)
 class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
-    `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain and delay: sensors in the order in which tests first have them), the hammer, of a
-    miss twice that and its way, of a sensor's place and direction four times its channel and one of four ways, the material (`Spindle.used_materials`), or unused; `modes` the pair of a discrepancy.
+    `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain and delay:
+    sensors in the order in which tests first have them), the hammer, of a miss twice that and its way, of a sensor's place and direction
+    four times its channel and one of four ways, the material (`Spindle.used_materials`), or unused; `modes` the pair of a discrepancy.
     """
 
     kind: str
@@ -122,7 +132,8 @@ class Nuisance:
 
 @dataclass(frozen=True, eq=False)
 class Unevenness:
-    """How what is drawn alike may be built: joints whose stiffness is K + (P K + K P) / 2 times its share, to first order, with a `pattern` P (5, 5) each; `sd` is that of the share."""
+    """How what is drawn alike may be built: joints whose stiffness is K + (P K + K P) / 2 times its
+    share, to first order, with a `pattern` P (5, 5) each; `sd` is that of the share."""
 
     name: str
     sd: float
@@ -130,8 +141,9 @@ class Unevenness:
 
 
 def unevennesses(spindle: Spindle) -> tuple[Unevenness, ...]:
-    """Of every joint whose stiffness is drawn alike against both moves across the axis, or both tilts: no joint is built so. It is stiffer against one of the two, or against their sum. And of shafts
-    that bend, section by section, whose steps and fits stiffen them otherwise than their diameters say."""
+    """Of every joint whose stiffness is drawn alike against both moves across the axis, or both tilts:
+    no joint is built so. It is stiffer against one of the two, or against their sum. And of shafts that
+    bend, section by section, whose steps and fits stiffen them otherwise than their diameters say."""
     found = []
     for joint in spindle.structure.own_joints:
         for first, second in ((0, 1), (3, 4)):
@@ -162,8 +174,9 @@ def _sections(shaft: Shaft, spindle: Spindle) -> list[Unevenness]:
 
 @dataclass(frozen=True)
 class Resonance:
-    """A light resonance as it was seen, about which its parameters move: frequency in Hz at the reference temperature, damping ratio, and the roots of the masses that the first
-    reference modes carry along in it, over their modal masses; `drift` is what ln frequency changes by over `RANGE_K`, in a straight line and with the square."""
+    """A light resonance as it was seen, about which its parameters move: frequency in Hz at the reference temperature,
+    damping ratio, and the roots of the masses that the first reference modes carry along in it, over their modal
+    masses; `drift` is what ln frequency changes by over `RANGE_K`, in a straight line and with the square."""
 
     frequency: float
     damping: float
@@ -192,7 +205,8 @@ class Resonance:
 
 
 def changes_of(tests: Sequence[str], far: Sequence[float], rows: Sequence[str], faster: Sequence[Array]) -> list[Nuisance]:
-    """By what the change of the balls' stiffness may be off in tests so `far` (`RANGE_K`) from the reference temperature, where speed makes that of each of the `rows` `faster` (rows,) (relative) another."""
+    """By what the change of the balls' stiffness may be off in tests so `far` (`RANGE_K`) from the
+    reference temperature, where speed makes that of each of the `rows` `faster` (rows,) (relative) another."""
     found = [Nuisance(CHANGE, f"{CHANGE} with temperature", CONTACT_SD)] if any(far) else []
     for t, (name, f, n) in enumerate(zip(tests, far, faster, strict=True)):
         if sd := CONTACT_APART * CONTACT_SD * abs(f) + CHANGE_SD * abs(float(np.mean(n))):
@@ -205,7 +219,8 @@ def changes_of(tests: Sequence[str], far: Sequence[float], rows: Sequence[str], 
 def nuisances(
     spindle: Spindle, build: Sequence[Toleranced], tests: Sequence[str], with_lines: bool, channels: int, hammers: int, modes: ReferenceModes, changes: Sequence[Nuisance] = ()
 ) -> tuple[Nuisance, ...]:
-    """All nuisance parameters of a campaign with `tests` (ids): those of FRF lines only where a test has any, `changes` of the balls' stiffness among them (`changes_of`)."""
+    """All nuisance parameters of a campaign with `tests` (ids): those of FRF lines only where a
+    test has any, `changes` of the balls' stiffness among them (`changes_of`)."""
     t = spindle.tolerances
     found = [Nuisance(BUILD, p.name, p.sd, index=i) for i, p in enumerate(build)]
     found += [Nuisance(EXPANSION, name, sd, index=i) for i, (name, sd) in enumerate(EXPANSION_SD.items())]

@@ -79,7 +79,8 @@ class Numbers:
 
     @cached_property
     def balls(self) -> list[Integers]:
-        """For every test the numbers of the parameters by which balls are stiffer: in one direction, with temperature, by their orbits, and in this test."""
+        """For every test the numbers of the parameters by which balls are stiffer: in one
+        direction, with temperature, by their orbits, and in this test."""
         own = self._of(kinds_of.BALLS, kinds_of.CHANGE, kinds_of.ORBITS)
         return [own[np.isin(self.places[0][own], (-1, t))] for t in range(len(self.tests))]
 
@@ -111,7 +112,8 @@ class Numbers:
 
     @cached_property
     def discrepancies(self) -> list[tuple[Discrepancies, Discrepancies]]:
-        """For every test, of stiffness and of damping: parameter numbers, first and second mode of each, and its factor in the modal matrix."""
+        """For every test, of stiffness and of damping: parameter numbers, first and second mode of
+        each, and its factor in the modal matrix."""
         found = []
         omega, damping = self.reference.omega, np.sqrt(2 * self.reference.damping * self.reference.omega)
         for t in range(len(self.tests)):
@@ -144,7 +146,8 @@ class Numbers:
 
     @cached_property
     def sensors(self) -> tuple[Integers, Integers]:
-        """The numbers of the parameters by which sensors are off their places and directions, and four times the channel with the way of each."""
+        """The numbers of the parameters by which sensors are off their places and directions, and
+        four times the channel with the way of each."""
         own = self._of(kinds_of.PLACE, kinds_of.ASKEW)
         return own, self.places[1][own]
 

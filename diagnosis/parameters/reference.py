@@ -1,4 +1,5 @@
-"""Modes of the reference condition, in whose coordinates a model is constantly a little wrong, and what such an error makes of the stiffness."""
+"""Modes of the reference condition, in whose coordinates a model is constantly a little wrong, and
+what such an error makes of the stiffness."""
 
 from __future__ import annotations
 
@@ -56,7 +57,8 @@ class ReferenceModes:
         return {}
 
     def moved(self, plain: Matrices, acting: Matrices) -> Array:
-        """Relative changes (2, seen) of the frequency and the damping of the modes seen from one state to another of the same dofs, to first order."""
+        """Relative changes (2, seen) of the frequency and the damping of the modes seen from one
+        state to another of the same dofs, to first order."""
         omega, damping = self.omega[: self.seen], self.damping[: self.seen]
         shape = np.linalg.solve(plain.mass, self.over(plain.dofs)[:, : self.seen])
         of_k, of_m, of_c = (np.einsum("ni,nj,ji->i", shape, getattr(acting, w) - getattr(plain, w), shape) for w in ("stiffness", "mass", "damping"))
@@ -65,10 +67,12 @@ class ReferenceModes:
 
 @dataclass(frozen=True, eq=False)
 class Turned:
-    """A constant error of the stiffness between modes, E (m, m) over the modal matrix, of what is `stated` of every pair of modes: with what keeps frequencies, to the second order, as these have them.
+    """A constant error of the stiffness between modes, E (m, m) over the modal matrix, of what is
+    `stated` of every pair of modes: with what keeps frequencies, to the second order, as these have them.
 
-    An error of the stiffness between two modes turns their shapes, to the first order, and pushes their frequencies apart, to the second, by more than these are known to: what fits a shape would bend
-    the valley of every fit. So shapes of modes that are `FAR_APART` turn, and frequencies stay: K = e^-T (K_0 + X) e^T, T_ij = X_ij / (w_i^2 - w_j^2), to the second order in X.
+    An error of the stiffness between two modes turns their shapes, to the first order, and pushes their frequencies apart, to
+    the second, by more than these are known to: what fits a shape would bend the valley of every fit. So shapes of modes that
+    are `FAR_APART` turn, and frequencies stay: K = e^-T (K_0 + X) e^T, T_ij = X_ij / (w_i^2 - w_j^2), to the second order in X.
     """
 
     stated: Array
@@ -84,7 +88,8 @@ class Turned:
         return np.asarray(self.stated + second)
 
     def by_pairs(self, i: Integers, j: Integers) -> Array:
-        """Vectors v (m, 2 k) of the derivatives e_i v^T + v e_i^T + e_j v'^T + v' e_j^T by what is stated of k pairs of modes: those beside e_i first, then those beside e_j."""
+        """Vectors v (m, 2 k) of the derivatives e_i v^T + v e_i^T + e_j v'^T + v' e_j^T by what is
+        stated of k pairs of modes: those beside e_i first, then those beside e_j."""
         one = np.eye(len(self.stated))
         apart = self.gaps[i, j] != 0.0
         found = []
@@ -96,8 +101,9 @@ class Turned:
 
 
 def reference_modes(linear: Matrices, seen: float, highest: float, most: int) -> ReferenceModes:
-    """Modes of the undamped, standing reference below `highest`, `most` of them, and how many of these lie below `seen` (rad/s). Where there are more, those
-    that coincide are kept or left together: one of the two planes of a shaft alone would make the other a change of what is measured."""
+    """Modes of the undamped, standing reference below `highest`, `most` of them, and how many of these
+    lie below `seen` (rad/s). Where there are more, those that coincide are kept or left together: one
+    of the two planes of a shaft alone would make the other a change of what is measured."""
     squares, vectors = eigh(linear.stiffness, linear.mass)
     omega = np.sqrt(np.maximum(squares, 0.0))
     keep = np.flatnonzero((omega > RIGID * omega.max()) & (omega < highest))

@@ -1,6 +1,7 @@
 """Sizes of what a fit moves beside effects, where these are to be learned: places of a grid, their prior odds, and the likeliest of them.
 
-Every size is that of one kind of nuisance (`nuisance`): of the model's constant and drifting discrepancies, of gain drift, of thermal motions.
+Every size is that of one kind of nuisance (`nuisance`): of the model's constant and drifting
+discrepancies, of gain drift, of thermal motions.
 """
 
 from __future__ import annotations
@@ -29,24 +30,25 @@ GRIDS = {
     kinds_of.OF_CONDITIONS: (0.0, 0.01, 0.03, 0.1),
 }
 WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
-"""Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less than those of any two effects: one
-tolerance that is strained tells of an effect, several of a drawing that is off."""
+"""Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less
+than those of any two effects: one tolerance that is strained tells of an effect, several of a drawing that is off."""
 FARTHER = {1.0: 0.0, 3.0: -2.0, 6.0: -4.0}
-"""Prior odds (ln) that thermal motions are off by so many times what two finite-element programs differ by, assumed: one spindle in eight by a per cent, one in sixty by two, where any
-one effect is in one of a hundred."""
+"""Prior odds (ln) that thermal motions are off by so many times what two finite-element programs differ by,
+assumed: one spindle in eight by a per cent, one in sixty by two, where any one effect is in one of a hundred."""
 UNCALIBRATED = {1.0: 0.0, 3.0: -2.0}
-"""Prior odds (ln) that hammers' gains are off by three times what the scene's channels are, assumed: a hammer whose calibration is old, or that always hits askew by 10 to 15 degrees,
-is off by some per cent, which a sensor's gain would have to explain in part."""
+"""Prior odds (ln) that hammers' gains are off by three times what the scene's channels are, assumed: a hammer whose calibration is
+old, or that always hits askew by 10 to 15 degrees, is off by some per cent, which a sensor's gain would have to explain in part."""
 OTHERWISE = {0.0: 0.0, 0.01: 0.0, 0.03: -2.0, 0.1: -4.0}
-"""Prior odds (ln) that what temperature and speed do to a mode is off by such a share of it, assumed: one spindle in eight by 3 %, one in sixty by a tenth, which a missing effect may be as well."""
+"""Prior odds (ln) that what temperature and speed do to a mode is off by such a share of it,
+assumed: one spindle in eight by 3 %, one in sixty by a tenth, which a missing effect may be as well."""
 ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER, kinds_of.HAMMER: UNCALIBRATED, kinds_of.OF_CONDITIONS: OTHERWISE}
 """By kind of nuisance, of sizes of which one is that of the scene or of the model itself."""
 BETWEEN = 2  # places between two of a grid that are not nothing
 
 
 def finer(grid: Sequence[float]) -> tuple[float, ...]:
-    """What is not nothing of a grid, with places `BETWEEN`. Dozens of numbers share the size of a drift: between places that are three times apart they lose some 0.2 in ln evidence each,
-    which one effect that takes one channel's part of it would win."""
+    """What is not nothing of a grid, with places `BETWEEN`. Dozens of numbers share the size of a drift: between places that are
+    three times apart they lose some 0.2 in ln evidence each, which one effect that takes one channel's part of it would win."""
     sizes = [size for size in grid if size > 0]
     return *(float(f"{f:.2g}") for low, high in pairwise(sizes) for f in np.geomspace(low, high, BETWEEN + 1, endpoint=False)), sizes[-1]
 
@@ -62,9 +64,11 @@ def ln_odds(sizes: Mapping[str, float]) -> float:
 
 
 def likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> tuple[Array, float, dict[str, float]]:
-    """The ln evidence that `each` gives, the errors of `scales` and the sizes of discrepancies of `grids`, and between their places, that have most of it: by the step that gains most, until none does.
+    """The ln evidence that `each` gives, the errors of `scales` and the sizes of discrepancies of
+    `grids`, and between their places, that have most of it: by the step that gains most, until none does.
 
-    Steps in a set order end lower: what comes first takes for constant errors of modes what is a change of the balls' stiffness, and no step of one size leads back.
+    Steps in a set order end lower: what comes first takes for constant errors of modes what is a
+    change of the balls' stiffness, and no step of one size leads back.
     """
     known: dict[tuple[float, ...], tuple[float, Array]] = {}
 
@@ -105,8 +109,9 @@ def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
 
 
 def _swaps(grids: Mapping[str, Sequence[float]], sizes: Mapping[str, float]) -> list[dict[str, float]]:
-    """Steps from one kind of what is wrong with modes and bearings to another: what is off by the same in all tests could be taken for drift, what changes in damping for a change of frequencies, and beside the one the other
-    costs more than it gains. With nothing hidden a stranger's grinding spindle stood 67 in ln evidence below by that, and any effect gained what came by it."""
+    """Steps from one kind of what is wrong with modes and bearings to another: what is off by the same in all tests could be taken
+    for drift, what changes in damping for a change of frequencies, and beside the one the other costs more than it gains. With
+    nothing hidden a stranger's grinding spindle stood 67 in ln evidence below by that, and any effect gained what came by it."""
     own = [kind for kind in SWAPPED if kind in grids]
     return [{a: grids[a][0], b: size} for a in own if sizes[a] != grids[a][0] for b in own if b != a for size in grids[b] if size != sizes[b]]
 

@@ -1,8 +1,9 @@
 """The smallest size of every effect that a campaign would have shown.
 
-What an effect of some size really does to every line is worked out, and tolerances, measuring errors and what was learned that the model is wrong by are
-fitted anew beside it; the size is changed until what is left is worth `ASKED` in ln evidence. First order alone, as screening has it, would be far too
-small or too large for what grows otherwise than in proportion: a film that must first part the surfaces, a seat that must first lose its play.
+What an effect of some size really does to every line is worked out, and tolerances, measuring errors and what was
+learned that the model is wrong by are fitted anew beside it; the size is changed until what is left is worth
+`ASKED` in ln evidence. First order alone, as screening has it, would be far too small or too large for what grows
+otherwise than in proportion: a film that must first part the surfaces, a seat that must first lose its play.
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ SHOWS, HIDES = 3.0, 2.0  # standard errors of a typical size, from which an effe
 def smallest(
     model: CampaignModel, about: Fit, learned: Learned, screened: Sequence[Screened], workers: int | None = None
 ) -> dict[str, tuple[Mechanism, float]]:
-    """The variant of every effect of the catalogue that shows at the smallest size, and that size less the neutral one, in its unit: none where
-    it does not show within its limits. `about` is the fit without effects; discrepancies and errors are as large as `learned`."""
+    """The variant of every effect of the catalogue that shows at the smallest size, and that size
+    less the neutral one, in its unit: none where it does not show within its limits. `about` is the
+    fit without effects; discrepancies and errors are as large as `learned`."""
     best: dict[str, tuple[float, Mechanism]] = {}
     for s in screened:
         m = s.mechanism
@@ -53,8 +55,8 @@ def smallest(
 
 
 def unseen_beside(found: Search, accepted: Hypothesis) -> tuple[str, ...]:
-    """Of the effects that resemble those of an explanation the ones whose typical size these data would show alone, but not beside it: how much of
-    what it explains is theirs, nobody can tell."""
+    """Of the effects that resemble those of an explanation the ones whose typical size these data
+    would show alone, but not beside it: how much of what it explains is theirs, nobody can tell."""
     alike = {name for m in accepted.mechanisms for name in m.effect.resembles} - set(accepted.names)
     asked = [s.mechanism for s in found.screened if s.mechanism.name in alike and s.mechanism.kind == "law" and s.visibility > 0]
     alone, beside = (_shown(found.model, h.fit, accepted.evidence.learned, asked) for h in (found.base, accepted))
@@ -84,8 +86,9 @@ def _smallest(model: CampaignModel, about: Fit, learned: Learned, task: tuple[fl
 
 
 def _size_that_shows(shown: Callable[[float], float], m: Mechanism, first: float, limit: float) -> float | None:
-    """The size, up to a `limit`, that shows by as many standard errors as are asked, where `shown` tells by how many one does: infinitely many where no spindle can be built with it.
-    By the rule of three from the `first` on, until one shows and another does not, and between them by Brent's method, in ln of both. None where the limit does not show."""
+    """The size, up to a `limit`, that shows by as many standard errors as are asked, where `shown` tells by how many
+    one does: infinitely many where no spindle can be built with it. By the rule of three from the `first` on, until one
+    shows and another does not, and between them by Brent's method, in ln of both. None where the limit does not show."""
 
     @cache
     def above(ln_size: float) -> float:
@@ -109,17 +112,18 @@ def _size_that_shows(shown: Callable[[float], float], m: Mechanism, first: float
 
 
 def standard_errors(m: Mechanism, size: float, seen: float) -> float:
-    """How many standard errors are worth `ASKED` in ln evidence, where a `size` shows by `seen` of them: what it explains, less what it costs to leave
-    its prior open (MacKay, *Neural Computation* 4 (1992) 415, Eq. 2.6, of one parameter)."""
+    """How many standard errors are worth `ASKED` in ln evidence, where a `size` shows by `seen` of them: what it explains,
+    less what it costs to leave its prior open (MacKay, *Neural Computation* 4 (1992) 415, Eq. 2.6, of one parameter)."""
     return float(np.sqrt(2 * ASKED + np.log1p((m.size.prior_sd * seen / size) ** 2)))
 
 
 def _fitted_beside(model: CampaignModel, about: Fit, learned: Learned, m: Mechanism, size: float, known: Sequence[tuple[float, Point]] = ()) -> Point:
-    """All else (P,), beside `about`, fitted to an effect of `size` less its neutral one, of infinite cost where no spindle can be built with it.
+    """All else (P,), beside `about`, fitted to an effect of `size` less its neutral one, of
+    infinite cost where no spindle can be built with it.
 
-    The spindle `about` with the effect is taken for measured, without noise. First a share of its size that does no more than noise would, then `GROWS` times as much and so on, everything else
-    going on from where it went (a homotopy: Allgower & Georg, *Numerical Continuation Methods*, 1990), or from a size that is `known` and as near: peaks that moved by
-    their widths lead nowhere by themselves.
+    The spindle `about` with the effect is taken for measured, without noise. First a share of its size that does no more than noise
+    would, then `GROWS` times as much and so on, everything else going on from where it went (a homotopy: Allgower & Georg, *Numerical
+    Continuation Methods*, 1990), or from a size that is `known` and as near: peaks that moved by their widths lead nowhere by themselves.
     """
     base, shape = linearised(model, about), [q.neutral for q in m.shape]
     problem = Problem(model, (), replace(as_stated(learned.sizes), errors=learned.errors), about.moved)
@@ -144,8 +148,9 @@ def _fitted_beside(model: CampaignModel, about: Fit, learned: Learned, m: Mechan
 
 
 def _beside(problem: Problem, about: Fit, base: Linearisation, moved: Sequence[Array], start: Array) -> Point:
-    """All else (P,), beside `about`, where it leaves least of residuals that have `moved`. Steps of Gauss and Newton until they gain little, with the derivatives of `about` (the
-    chord method: Ortega & Rheinboldt, *Iterative Solution of Nonlinear Equations*, 1970, 7.1) for as long as these lead on."""
+    """All else (P,), beside `about`, where it leaves least of residuals that have `moved`. Steps of
+    Gauss and Newton until they gain little, with the derivatives of `about` (the chord method: Ortega
+    & Rheinboldt, *Iterative Solution of Nonlinear Equations*, 1970, 7.1) for as long as these lead on."""
     model = problem.model
 
     def at(step: Array) -> Point:

@@ -1,9 +1,9 @@
 """What an explanation predicts of a test that has not been made: its modes, and the errors that all of them share.
 
-About a point p of an explanation's posterior, of covariance C, sizes at the new condition and shape parameters of its mechanisms are a = G p, and have the
-covariance A = G C G^T + V, with V what laws leave open from one condition to another. Where a is off by d, all else that was fitted is off with it, by
-C G^T A^-1 d, and about that has the covariance C - C G^T A^-1 G C (jointly Gaussian quantities: Rasmussen & Williams, *Gaussian Processes*, 2006,
-Eq. A.6). With the first the modes are worked out anew; what the second does to them is linear.
+About a point p of an explanation's posterior, of covariance C, sizes at the new condition and shape parameters of its mechanisms are a = G
+p, and have the covariance A = G C G^T + V, with V what laws leave open from one condition to another. Where a is off by d, all else that
+was fitted is off with it, by C G^T A^-1 d, and about that has the covariance C - C G^T A^-1 G C (jointly Gaussian quantities: Rasmussen &
+Williams, *Gaussian Processes*, 2006, Eq. A.6). With the first the modes are worked out anew; what the second does to them is linear.
 """
 
 from __future__ import annotations
@@ -34,8 +34,9 @@ LEAST = 1e-9  # of a prior variance: what is left open at least
 
 @dataclass(frozen=True)
 class ModePrediction:
-    """Natural frequency (Hz) and damping ratio of a mode, with the standard deviation of the frequency; and what of that is `common` to all modes of the test:
-    what one standard deviation of the thermometer, of the sizes, and of each independent part of all else that was fitted moves this one by (Hz)."""
+    """Natural frequency (Hz) and damping ratio of a mode, with the standard deviation of the frequency;
+    and what of that is `common` to all modes of the test: what one standard deviation of the thermometer,
+    of the sizes, and of each independent part of all else that was fitted moves this one by (Hz)."""
 
     frequency: float
     sd: float
@@ -59,8 +60,8 @@ class Standing:
 
 
 def standing(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Standing:
-    """At its posterior mean, which is the least of a quadratic; where the true chi2 there is none of that, fitted anew, and where it still is not, at that fit:
-    there at once where its ln evidence is below `least`."""
+    """At its posterior mean, which is the least of a quadratic; where the true chi2 there is none of that,
+    fitted anew, and where it still is not, at that fit: there at once where its ln evidence is below `least`."""
     promised = _as_promised(model, h)
     if not promised and h.evidence.ln > least:
         h = settled(model, h)
@@ -74,10 +75,11 @@ def _as_promised(model: CampaignModel, h: Hypothesis) -> bool:
 
 
 def forecast(model: CampaignModel, s: Standing, plan: Condition, rates: Array | None = None) -> list[ModePrediction] | None:
-    """Modes in the band at a condition; None where no spindle can be built, or one that rattles, or `rates` (`by_all`) are of another number of modes.
+    """Modes in the band at a condition; None where no spindle can be built, or one that rattles, or
+    `rates` (`by_all`) are of another number of modes.
 
-    Errors: of each mode its own of reading, and of the drift from test to test that was learned; common to all, those of the thermometer, of sizes and of
-    all else that was fitted.
+    Errors: of each mode its own of reading, and of the drift from test to test that was learned;
+    common to all, those of the thermometer, of sizes and of all else that was fitted.
     """
     h, problem = s.hypothesis, Problem(model, s.hypothesis.mechanisms)
     turn, left = _continued(model, h, problem, plan)
@@ -109,7 +111,8 @@ def forecast(model: CampaignModel, s: Standing, plan: Condition, rates: Array | 
 
 
 def by_all(model: CampaignModel, s: Standing, plan: Condition) -> Array:
-    """Derivatives (k, P + 1) of ln frequencies at a condition by all nuisance parameters, and by its thermometer; raises what the model raises."""
+    """Derivatives (k, P + 1) of ln frequencies at a condition by all nuisance parameters, and by
+    its thermometer; raises what the model raises."""
     problem = Problem(model, s.hypothesis.mechanisms)
     there = _unmade(model, plan)
     x, effects = _acting(there, problem, s.point, _continued(model, s.hypothesis, problem, plan)[0] @ s.point)
@@ -133,7 +136,8 @@ def _unmade(model: CampaignModel, plan: Condition) -> CampaignModel:
 
 
 def _acting(there: CampaignModel, problem: Problem, p: Array, amounts: Array) -> tuple[Array, list]:
-    """Nuisance values (P,) of parameters `p` (n,), without those of any one test, and the effects in the one to be made, of `amounts` (`_continued`)."""
+    """Nuisance values (P,) of parameters `p` (n,), without those of any one test, and the effects
+    in the one to be made, of `amounts` (`_continued`)."""
     x, at, effects = p[: problem.nuisances], 0, []
     for m in problem.mechanisms:
         shape = [float(np.clip(q.neutral + q.prior_sd * v, *q.limits)) for q, v in zip(m.shape, amounts[at + 1 :], strict=False)]
@@ -143,8 +147,8 @@ def _acting(there: CampaignModel, problem: Problem, p: Array, amounts: Array) ->
 
 
 def _continued(model: CampaignModel, h: Hypothesis, problem: Problem, plan: Condition) -> tuple[Array, Array]:
-    """Of every mechanism the size at another condition, by the prior that was learned for its law, and the shape parameters, less the neutral ones and in
-    prior standard deviations: derivatives (a, n) by all parameters, and the variances (a,) that laws leave open."""
+    """Of every mechanism the size at another condition, by the prior that was learned for its law, and the shape parameters, less the
+    neutral ones and in prior standard deviations: derivatives (a, n) by all parameters, and the variances (a,) that laws leave open."""
     conditions, n, at, learned = [*(d.condition for d in model.tests), plan], len(model.tests), problem.nuisances, h.evidence.learned
     rows, left = [np.zeros((0, problem.length))], []
     for m, root, own in zip(h.mechanisms, problem.roots, learned.own, strict=True):

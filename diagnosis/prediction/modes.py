@@ -50,7 +50,8 @@ class Predicted:
 
 
 def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0, lumped: bool = False) -> Predicted:
-    """Modes at the condition of an observation, `warmer` kelvin above what its thermometer said; `lumped` with the masses of shafts at nodes, as MuJoCo steps them."""
+    """Modes at the condition of an observation, `warmer` kelvin above what its thermometer said;
+    `lumped` with the masses of shafts at nodes, as MuJoCo steps them."""
     condition = replace(observation.condition, temperature=observation.condition.temperature + warmer)
     point = operating_point(spindle, condition, effects)
     linear = Linear(matrices(point.chain), point.measurement, point.chain.layout, None if lumped else mass_between(point, spindle))

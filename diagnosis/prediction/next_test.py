@@ -1,8 +1,9 @@
 """Which test would decide between the explanations that survive, and what each of them predicts of it.
 
-Two explanations differ at a condition by D in the frequencies of their modes; with the covariance S of the errors of a test there and of what each leaves
-open, the expected ln odds if either is true are D S^-1 D / 2 (Box & Hill, *Technometrics* 9 (1967) 57). That they leave different things open would add to
-that; it is not counted, for these are known to first order alone. In S is also what two honest programs differ by: a test by which it is decided has to show more than that.
+Two explanations differ at a condition by D in the frequencies of their modes; with the covariance S of the errors of a test
+there and of what each leaves open, the expected ln odds if either is true are D S^-1 D / 2 (Box & Hill, *Technometrics* 9
+(1967) 57). That they leave different things open would add to that; it is not counted, for these are known to first order
+alone. In S is also what two honest programs differ by: a test by which it is decided has to show more than that.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ MOST = 3
 
 @dataclass(frozen=True)
 class NextTest:
-    """How far apart a test at `condition` puts two explanations, as odds if either is true (no more than a million); how many repeats make them
-    100 to 1; what they differ in most, in words; what each predicts of every mode in the band; and whether it is `beyond` the temperatures that the spindle is meant for."""
+    """How far apart a test at `condition` puts two explanations, as odds if either is true (no more than a
+    million); how many repeats make them 100 to 1; what they differ in most, in words; what each predicts
+    of every mode in the band; and whether it is `beyond` the temperatures that the spindle is meant for."""
 
     condition: Condition
     separates: tuple[str, str]
@@ -51,8 +53,9 @@ class NextTest:
 
 
 def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
-    """The best test for each pair of the leading explanation and its nearest rivals; of what nothing explains but drift, of that and the best of the catalogue.
-    One beyond the temperatures that the spindle is meant for only where none within decides; none faster than it is."""
+    """The best test for each pair of the leading explanation and its nearest rivals; of what
+    nothing explains but drift, of that and the best of the catalogue. One beyond the temperatures
+    that the spindle is meant for only where none within decides; none faster than it is."""
     possible = [c for c in verdict.candidates if c.names == verdict.effects or not beyond_limits(c.hypothesis)]
     alive = [c for c in possible if set(c.names) <= set(verdict.effects) or c.probability > ALIVE][: MOST + 1]
     if len(alive) < 2:
@@ -123,8 +126,8 @@ def _weighed(plan: Condition, lead: Candidate, rival: Candidate, a: Sequence[Mod
 
 
 def of_both(a: Sequence[ModePrediction], b: Sequence[ModePrediction]) -> Array:
-    """Covariance (k, k) of what a test may show of the difference of two predictions, Hz^2: its own errors, of reading and of its thermometer, once, and what
-    each of the two leaves open."""
+    """Covariance (k, k) of what a test may show of the difference of two predictions, Hz^2: its own
+    errors, of reading and of its thermometer, once, and what each of the two leaves open."""
     first, second = covariance(a), covariance([replace(m, sd=float(np.sqrt(max(m.sd**2 - m.common[0] ** 2, 0.0))), common=m.common[1:]) for m in b])
     one, other = (np.array([m.sd**2 - sum(v**2 for v in m.common) for m in of]) for of in (a, b))
     programs = np.array([NUMERICS[0] * m.frequency for m in a])

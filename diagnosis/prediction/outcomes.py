@@ -39,8 +39,8 @@ class Outcome:
 def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
     """Every prediction of an earlier diagnosis (its JSON `file`) for which a test has been made since; BadInput for another file.
 
-    A test is the one that was planned where temperature, speed, level and soak time are: what is not told of the latter is a light tap, after all the time
-    that it takes.
+    A test is the one that was planned where temperature, speed, level and soak time are: what is
+    not told of the latter is a light tap, after all the time that it takes.
     """
     where, what = f"--predictions {file}", "predictions in next_test"
     told = read_raw(file, where, what)
@@ -57,8 +57,8 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
 
 
 def _table(modes: Sequence[dict[str, Any]]) -> tuple[Array, Array]:
-    """Predicted modes (k, 4): frequency and its error in Hz, damping ratio and its error; and what errors common to all modes move each by (k, c), Hz, none
-    where the answer has none. ValueError for no modes, and for what is no number."""
+    """Predicted modes (k, 4): frequency and its error in Hz, damping ratio and its error; and what errors common to all
+    modes move each by (k, c), Hz, none where the answer has none. ValueError for no modes, and for what is no number."""
     columns = {"frequency_Hz": None, "sd_Hz": None, "damping": 1.0, "damping_sd": np.inf}
     rows = [[row[key] if default is None else row.get(key, default) for key, default in columns.items()] for row in modes]
     table = np.array(rows, float)
@@ -86,7 +86,8 @@ def _is(o: Observation, planned: dict[str, Any]) -> bool:
 
 
 def _outcome(o: Observation, name: str, predicted: Array, common: Array) -> Outcome | None:
-    """Modes paired in the way that costs least in ln frequency; frequencies and, where known and predicted, ln damping ratios. None of a test in which no mode was found: it says nothing."""
+    """Modes paired in the way that costs least in ln frequency; frequencies and, where known and
+    predicted, ln damping ratios. None of a test in which no mode was found: it says nothing."""
     seen, expected = pairs(ModeSet(o.frequency), ModeSet(predicted[:, 0]), NEAREST).T
     frequency, sd, damping, damping_sd = predicted[expected].T
     off = np.log(np.concatenate([o.frequency[seen] / frequency, o.damping[seen] / damping]))

@@ -89,8 +89,9 @@ def group(o: Observation, p: Predicted, partner: Integers, mode: int) -> list[in
 
 
 def shapes(o: Observation, p: Predicted, partner: Integers) -> dict[int, tuple[ComplexArray, ComplexArray]]:
-    """Measured and computed shape (n,) of the paired measured modes: the computed one is its partner's, in a close group the combination nearest to it. They are at the responses, or of a
-    roving hammer at the references; of a mode whose group has as many members as there are points any shape is a combination, and there is none to compare."""
+    """Measured and computed shape (n,) of the paired measured modes: the computed one is its partner's, in a close
+    group the combination nearest to it. They are at the responses, or of a roving hammer at the references; of a mode
+    whose group has as many members as there are points any shape is a combination, and there is none to compare."""
     if o.shape is None:
         return {}
     measured, computed = (o.residue, p.participation) if o.residue is not None and by_hammer(o) else (o.shape, p.shape)
@@ -103,5 +104,6 @@ def shapes(o: Observation, p: Predicted, partner: Integers) -> dict[int, tuple[C
 
 
 def by_hammer(o: Observation) -> bool:
-    """Whether the hammer went from point to point rather than the sensors: shapes are then those at its points, where left vectors of the model stand for right ones."""
+    """Whether the hammer went from point to point rather than the sensors: shapes are then those at
+    its points, where left vectors of the model stand for right ones."""
     return o.shape is not None and o.residue is not None and o.shape.shape[1] < o.residue.shape[1]

@@ -24,7 +24,8 @@ STEP = 0.1  # K, of the difference: frequencies move by less than 1e-4 of themse
 
 
 def temperature_slope(spindle: Spindle, o: Observation, p: Predicted, effects: Applied, lumped: bool = False) -> Array:
-    """Derivative (2k,) by temperature, 1/K, of [ln frequency, ln damping] of the k computed modes `p` of a test, `lumped` as `predict` has it.
+    """Derivative (2k,) by temperature, 1/K, of [ln frequency, ln damping] of the k computed modes
+    `p` of a test, `lumped` as `predict` has it.
 
     A one-sided difference towards the reference temperature, so that it stays inside laws that hold for the test itself.
     """
@@ -46,7 +47,8 @@ def with_temperature(o: Observation, slope: Array, sd: float) -> Observation:
 
 
 def whitened(difference: Array, covariance: Array) -> Array:
-    """Errors (n,) with covariance C (n, n) as n independent ones of unit variance, L^-1 r with C = L L^T: their squares add up to r^T C^-1 r."""
+    """Errors (n,) with covariance C (n, n) as n independent ones of unit variance, L^-1 r with C =
+    L L^T: their squares add up to r^T C^-1 r."""
     if not len(difference):
         return np.zeros(0)
     return np.asarray(solve_triangular(np.linalg.cholesky(covariance), difference, lower=True), float)

@@ -1,8 +1,8 @@
 """Measured runout beside the scene's: every line with its cause, and the repeatable and nonrepeatable parts.
 
-The scene's imperfections are taken as they are, but where the balls stood when a record began nothing predicts: a line of both bearings, or of several
-balls, is their sum by chance. Its computed amplitude is the rms over random starts. Residuals are in standard deviations of the record, of that chance, and
-of how spindles of one drawing scatter about the scene's imperfections, which are one draw (`runout_sources`).
+The scene's imperfections are taken as they are, but where the balls stood when a record began nothing predicts: a line of both bearings, or
+of several balls, is their sum by chance. Its computed amplitude is the rms over random starts. Residuals are in standard deviations of the
+record, of that chance, and of how spindles of one drawing scatter about the scene's imperfections, which are one draw (`runout_sources`).
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ STARTS = 24  # random starts of the balls
 
 @dataclass(frozen=True, eq=False)
 class LineBeside:
-    """One line at one probe (m, zero to peak): `causes` strongest first by the scene; `measured_sd` is the record's error, `scatter` that of the
-    computed amplitude: chance of the start, and of the build."""
+    """One line at one probe (m, zero to peak): `causes` strongest first by the scene; `measured_sd` is
+    the record's error, `scatter` that of the computed amplitude: chance of the start, and of the build."""
 
     frequency: float
     order: float
@@ -122,7 +122,8 @@ def _beside(spindle: Spindle, seen: Seen, points: tuple[Point, ...]) -> RunoutBe
 def _parts(
     seen: Seen, waves: list[tuple[float, ComplexArray]], turning: float, ratios: Array
 ) -> tuple[tuple[PartBeside, ...], tuple[PartBeside, ...]]:
-    """The repeatable and the nonrepeatable part of every probe, in revolutions of what it sees: that turns `ratios` (probes,) times as fast as the spindle, at `turning` Hz."""
+    """The repeatable and the nonrepeatable part of every probe, in revolutions of what it sees:
+    that turns `ratios` (probes,) times as fast as the spindle, at `turning` Hz."""
     record = seen.test.runout
     assert record is not None
     n = len(seen.nodes)

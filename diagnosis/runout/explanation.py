@@ -18,7 +18,8 @@ ONE = 1e-3  # of the typical size, at which an effect's sources are computed: th
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """One choice of an effect's discrete parameters; `amplitudes` of its sources a unit of its first parameter; `parts` numbers of its families."""
+    """One choice of an effect's discrete parameters; `amplitudes` of its sources a unit of its
+    first parameter; `parts` numbers of its families."""
 
     effect: Effect
     values: Mapping[str, float]

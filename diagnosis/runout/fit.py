@@ -4,10 +4,11 @@ Lines that share a source in any test are one *family*. In a family, with tests 
 
     y_tp = sum over q of (h_tpq + sum over k of x_k dh_tpq/dx_k) exp(i psi_tg(q)) (c_q + a b_q) + error,
 
-c_q ~ CN(0, likely_q^2) what the spindle has of a source, x_k ~ N(0, sd_k^2) the relative build deviations, a the size of an effect that gives the source
-b_q a unit of size, N(0, prior^2), and psi the phases of groups of sources that keep step: what turns with the turning part, and each bearing's lines of one
-frequency. Every test starts with the balls elsewhere, so that psi is unknown, uniform, in every test. Every ball has its own phase in every test
-too: c_q of ball waviness is another in every test. A probe without phase enters by its amplitude.
+c_q ~ CN(0, likely_q^2) what the spindle has of a source, x_k ~ N(0, sd_k^2) the relative build deviations, a
+the size of an effect that gives the source b_q a unit of size, N(0, prior^2), and psi the phases of groups of
+sources that keep step: what turns with the turning part, and each bearing's lines of one frequency. Every test
+starts with the balls elsewhere, so that psi is unknown, uniform, in every test. Every ball has its own phase in
+every test too: c_q of ball waviness is another in every test. A probe without phase enters by its amplitude.
 
 chi2 is made least from several starts; the evidence is Laplace's, phases with the variance pi^2 / 3 of a uniform one.
 """
@@ -36,9 +37,9 @@ TURNING = "turning"
 class Family:
     """The data of lines that share sources: rows are (test, line, probe).
 
-    `value` (R,), `sd` (R,) of the complex error, `phased` (R,); `shown` (R, Q), `by_tolerance` (K, R, Q); `phase` (R, Q) the number from 1 of the
-    source's phase in the row, 0 where it shows nothing; `likely` (Q,); `source` names the columns and the test of those of one test alone; `free` is how
-    many of the phases the amplitudes' own phases do not stand for.
+    `value` (R,), `sd` (R,) of the complex error, `phased` (R,); `shown` (R, Q), `by_tolerance` (K, R, Q); `phase` (R, Q)
+    the number from 1 of the source's phase in the row, 0 where it shows nothing; `likely` (Q,); `source` names the columns
+    and the test of those of one test alone; `free` is how many of the phases the amplitudes' own phases do not stand for.
     """
 
     value: ComplexArray
@@ -78,8 +79,9 @@ class Family:
 
 @dataclass(frozen=True, eq=False)
 class FamilyFit:
-    """`size` (effects,) of the effects with standard errors `size_sd`; `amplitude` (Q,) of what the spindle has besides, in units of `likely`;
-    `residual` (R,) in standard errors; `chi2` with priors; `evidence` ln; `free_sd` (effects,) of the sizes without their priors."""
+    """`size` (effects,) of the effects with standard errors `size_sd`; `amplitude` (Q,) of what the
+    spindle has besides, in units of `likely`; `residual` (R,) in standard errors; `chi2` with
+    priors; `evidence` ln; `free_sd` (effects,) of the sizes without their priors."""
 
     size: Array
     size_sd: Array

@@ -1,4 +1,5 @@
-"""Lines of runout predicted and met: squares of what is left of a line whose phase nothing predicts, and tests left out one after the other."""
+"""Lines of runout predicted and met: squares of what is left of a line whose phase nothing
+predicts, and tests left out one after the other."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ def each_line(rows: Family) -> Iterator[Family]:
 
 
 def scattered(own: Family) -> ComplexArray:
-    """Covariance (R, R) of one line: its errors, and what the scene may have besides of its sources; each keeps step within its group of phases."""
+    """Covariance (R, R) of one line: its errors, and what the scene may have besides of its
+    sources; each keeps step within its group of phases."""
     cover = np.diag(own.sd**2).astype(complex)
     for same in np.unique(own.phase, axis=1).T:
         column = own.shown * np.all(own.phase == same[:, None], axis=0) * own.likely
@@ -52,7 +54,8 @@ def amplitude_of(own: Family, explained: Explanation) -> ComplexArray:
 
 
 def _squares(rows: Family, explained: Explanation | None) -> tuple[float, int]:
-    """Squared error of lines as the scene predicts them, or the scene with an effect of a given size, in its standard errors, and how many numbers.
+    """Squared error of lines as the scene predicts them, or the scene with an effect of a given
+    size, in its standard errors, and how many numbers.
 
     What the scene has besides is of its likely size.
     """

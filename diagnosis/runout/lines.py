@@ -1,8 +1,10 @@
-"""What a runout test shows: amplitude and phase of every known line at every probe with standard errors, and lines that theory does not know.
+"""What a runout test shows: amplitude and phase of every known line at every probe with standard
+errors, and lines that theory does not know.
 
-Lines are fitted by least squares at their known frequencies; lines too near to be separated in the record are one, seen at its middle. What is left of
-the record around a line gives its standard error. The cage turns a little faster or slower than computed, since a contact angle is not exact: one
-relative change of d cos(angle) / D of all bearings is found from the record first. In a spectrum the squares of a line's bins are added up.
+Lines are fitted by least squares at their known frequencies; lines too near to be separated in the record are
+one, seen at its middle. What is left of the record around a line gives its standard error. The cage turns a
+little faster or slower than computed, since a contact angle is not exact: one relative change of d cos(angle)
+/ D of all bearings is found from the record first. In a spectrum the squares of a line's bins are added up.
 """
 
 from __future__ import annotations
@@ -46,7 +48,8 @@ def key_of(line: Line) -> Key:
 
 @dataclass(frozen=True, eq=False)
 class SeenLine:
-    """Lines of theory that are one in the record: `phasor` (probes,) m at `frequency` (Hz) and standard errors `sd` (probes,), E|error|^2 = sd^2."""
+    """Lines of theory that are one in the record: `phasor` (probes,) m at `frequency` (Hz) and
+    standard errors `sd` (probes,), E|error|^2 = sd^2."""
 
     frequency: float
     lines: tuple[Line, ...]
@@ -127,7 +130,8 @@ def look(spindle: Spindle, test: Test) -> Seen:
 
 
 def expected(spindle: Spindle, condition: Condition, nodes: tuple[int, ...], seconds: float, like: Seen) -> Seen:
-    """The lines that a test not made yet would show, without their phasors: a record of `seconds` at a condition, its slip, noise and probes as of `like`."""
+    """The lines that a test not made yet would show, without their phasors: a record of `seconds`
+    at a condition, its slip, noise and probes as of `like`."""
     record = like.test.runout
     assert record is not None
     point = operating_point(spindle, condition)
@@ -170,7 +174,8 @@ def _clusters(known: list[Line], near: float) -> list[list[Line]]:
 
 
 def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: float, uncertain: Array) -> Array:
-    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies `uncertain` (k,) Hz, lines that beat, neighbours that leak.
+    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies
+    `uncertain` (k,) Hz, lines that beat, neighbours that leak.
 
     Lines fitted as one at their mean are off it by up to half their spread, as one whose frequency is uncertain is, and leak as much.
     """
@@ -186,8 +191,9 @@ def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: flo
 
 
 def _slip(record: RunoutRecord, frequency_at: Callable[[float], Array]) -> float:
-    """The likeliest slip: that whose lines leave least of the record, with its prior. What is left counts bin by bin by its logarithm over the floor, as errors with the wings of Student's distribution do (Lange,
-    Little & Taylor, *J. Am. Statist. Assoc.* 84 (1989) 881): a strong line that no slip explains pulls no more than a weak one."""
+    """The likeliest slip: that whose lines leave least of the record, with its prior. What is left counts bin by bin
+    by its logarithm over the floor, as errors with the wings of Student's distribution do (Lange, Little & Taylor,
+    *J. Am. Statist. Assoc.* 84 (1989) 881): a strong line that no slip explains pulls no more than a weak one."""
     window = np.hanning(record.value.shape[1] + 1)[:-1]
 
     def squares(value: Array) -> Array:

@@ -17,8 +17,8 @@ SHOWS = 0.3  # of what the scene alone is likely to show, from which an effect m
 
 @dataclass(frozen=True)
 class MovedLine:
-    """One line (Hz) of one test at the probe where the effect shows most; amplitudes in m, zero to peak: rms of what spindles of the scene show alone, and
-    with the effect beside it."""
+    """One line (Hz) of one test at the probe where the effect shows most; amplitudes in m, zero to
+    peak: rms of what spindles of the scene show alone, and with the effect beside it."""
 
     test: str
     frequency: float

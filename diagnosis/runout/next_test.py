@@ -1,9 +1,9 @@
 """Which runout test would tell explanations apart that the tests so far do not, and what each predicts of its lines.
 
-Two explanations differ at a plan - another speed or temperature, a further probe, a longer record - by D in the phasors of its lines. With S the covariance
-of the record's errors, of what the scene likely has besides of the same sources, of the build, and of the sizes of both, the expected ln odds if either is
-true are D^H S^-1 D (Box & Hill, *Technometrics* 9 (1967) 57, for complex data), at the phases at which they differ least: nothing predicts where the balls
-will stand. Repeats would not help, since the scene's own scatter is the same in each.
+Two explanations differ at a plan - another speed or temperature, a further probe, a longer record - by D in the phasors of its lines. With
+S the covariance of the record's errors, of what the scene likely has besides of the same sources, of the build, and of the sizes of both,
+the expected ln odds if either is true are D^H S^-1 D (Box & Hill, *Technometrics* 9 (1967) 57, for complex data), at the phases at which
+they differ least: nothing predicts where the balls will stand. Repeats would not help, since the scene's own scatter is the same in each.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ TOLD = 0.01  # of all that tells, from which a line is
 
 @dataclass(frozen=True)
 class Plan:
-    """A runout test that could be made: probes at `nodes`, a record of `seconds`; `changed` is how it differs from the tests so far, in words; `phased` whether
-    phases between probes are kept."""
+    """A runout test that could be made: probes at `nodes`, a record of `seconds`; `changed` is how
+    it differs from the tests so far, in words; `phased` whether phases between probes are kept."""
 
     condition: Condition
     nodes: tuple[int, ...]
@@ -48,7 +48,8 @@ class Plan:
 
 @dataclass(frozen=True)
 class LinePrediction:
-    """One line (Hz) at one probe as each of two explanations has it (m, zero to peak), what the scene alone likely shows there, and its share of the ln odds."""
+    """One line (Hz) at one probe as each of two explanations has it (m, zero to peak), what the
+    scene alone likely shows there, and its share of the ln odds."""
 
     frequency: float
     name: str
@@ -60,7 +61,8 @@ class LinePrediction:
 
 @dataclass(frozen=True)
 class NextRunout:
-    """How far apart a test puts two explanations, as odds if either is true (no more than a million), by which line most, and what each predicts."""
+    """How far apart a test puts two explanations, as odds if either is true (no more than a
+    million), by which line most, and what each predicts."""
 
     plan: Plan
     separates: tuple[str, str]

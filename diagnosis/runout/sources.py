@@ -1,9 +1,10 @@
 """What every possible imperfection of a spindle would show at the probes of runout tests, and how large each is likely to be.
 
-A *source* is one kind of imperfection seen in one line: an unbalance, a wave of one order on one race, radial or axial, the sizes of the balls
-of a row, their waves, a cage. What a source shows is linear in its complex amplitude. That amplitude is unknown: a scene's imperfections are
-one draw, of which another spindle of the drawing has only the size. Its likely size (rms) is the scene's own, pooled over rings, bearings and orders,
-races falling as 1/order and balls as 1/order^2 as in `model.built.drawn`; where a scene has none of a kind, that of its grade "high precision".
+A *source* is one kind of imperfection seen in one line: an unbalance, a wave of one order on one race, radial or
+axial, the sizes of the balls of a row, their waves, a cage. What a source shows is linear in its complex amplitude.
+That amplitude is unknown: a scene's imperfections are one draw, of which another spindle of the drawing has only the
+size. Its likely size (rms) is the scene's own, pooled over rings, bearings and orders, races falling as 1/order and
+balls as 1/order^2 as in `model.built.drawn`; where a scene has none of a kind, that of its grade "high precision".
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ SourceKey = tuple[Key, str]
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """`shown[source]` (tests, probes) m per unit amplitude, `by_tolerance[source]` (parameters, tests, probes) its derivative by the relative
-    build parameters `names` with standard deviations `sd`; `likely[source]` the rms amplitude (m, kg m, kg m2); `points` of the tests; `ratios` of the parts that turn, each speed over the spindle's once."""
+    """`shown[source]` (tests, probes) m per unit amplitude, `by_tolerance[source]` (parameters, tests, probes) its
+    derivative by the relative build parameters `names` with standard deviations `sd`; `likely[source]` the rms amplitude
+    (m, kg m, kg m2); `points` of the tests; `ratios` of the parts that turn, each speed over the spindle's once."""
 
     shown: Mapping[SourceKey, ComplexArray]
     by_tolerance: Mapping[SourceKey, ComplexArray]

@@ -1,9 +1,10 @@
 """Which imperfection of a running spindle is larger than its scene lets expect: unbalance, a race and its order, a ball, a cage.
 
-Effects are compared by evidence with all tolerances free, and one of five verdicts is given. The data are the lines of runout
-tests (`runout_lines`); without an effect every imperfection has an unknown amplitude of the size that the scene gives (`runout_sources`); an effect adds one of its
-own size, and what cannot be continuous (order, ring, bearing) is tried choice by choice: a *variant*. Everything falls apart into families of lines
-(`runout_fit`), so that an effect is fitted to the lines it can move alone. Parameters that runout does not determine (phases at an unknown start) stay typical.
+Effects are compared by evidence with all tolerances free, and one of five verdicts is given. The data are the lines of
+runout tests (`runout_lines`); without an effect every imperfection has an unknown amplitude of the size that the scene
+gives (`runout_sources`); an effect adds one of its own size, and what cannot be continuous (order, ring, bearing) is tried
+choice by choice: a *variant*. Everything falls apart into families of lines (`runout_fit`), so that an effect is fitted to
+the lines it can move alone. Parameters that runout does not determine (phases at an unknown start) stay typical.
 
 Lines in a record that theory does not know are unexplained whatever the rest says.
 """
@@ -37,8 +38,9 @@ SLACK = 1.5  # chi2 a number up to which a misfit is laid to the errors of lines
 
 @dataclass(frozen=True, eq=False)
 class RunoutDiagnosis:
-    """The verdict; `base` are the fits of all families without effects; `smallest` the size of each effect the data could show at `CLEAR`; `rivals`
-    what these data do not tell apart, or the leading explanation and the next; `next` the test that would, or `no_next` why there is none."""
+    """The verdict; `base` are the fits of all families without effects; `smallest` the size of each
+    effect the data could show at `CLEAR`; `rivals` what these data do not tell apart, or the
+    leading explanation and the next; `next` the test that would, or `no_next` why there is none."""
 
     verdict: str
     effects: tuple[str, ...]
@@ -100,7 +102,8 @@ Alone = dict[tuple[tuple[int, ...], bool], float]
 
 
 def _evidence_without(own: Sequence[int], parts: Sequence[Family], base: Sequence[FamilyFit], alone: Alone, beside: Explanation | None) -> float:
-    """The most evidence found of families without the effect that moves them all, or with the one `beside` it alone: each by itself, or as one.
+    """The most evidence found of families without the effect that moves them all, or with the one
+    `beside` it alone: each by itself, or as one.
 
     By itself each has build tolerances of its own; as one they share them, which is worth something without any effect.
     """
@@ -115,8 +118,8 @@ def _evidence_without(own: Sequence[int], parts: Sequence[Family], base: Sequenc
 
 
 def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit], alone: Alone, worth: bool = False, beside: Explanation | None = None) -> Explanation:
-    """The fit of variants to the families they move; the others stay. With `worth` one that cannot gain anything stays at size zero. Of two, the first is the one `beside`
-    which the other is weighed."""
+    """The fit of variants to the families they move; the others stay. With `worth` one that cannot
+    gain anything stays at size zero. Of two, the first is the one `beside` which the other is weighed."""
     own = sorted({i for v in chosen for i in v.parts})
     family = merged([parts[i] for i in own])
     b = [family.of_effect(v.amplitudes) for v in chosen]
@@ -173,9 +176,9 @@ def _pairs(best: Sequence[Explanation], tried: Sequence[Variant], parts: Sequenc
 
 
 def _smallest(effects: Sequence[Effect], tried: Sequence[Explanation], found: Sources, parts: Sequence[Family]) -> dict[str, float]:
-    """Size of each effect's most visible variant from which it would stand out at `CLEAR`: sqrt(2 CLEAR) standard deviations of what the scene may have of
-    the same lines, with the errors of the lines. Where it shares its line with something larger, it adds to that as chance has their angle: square to it, it
-    shows less."""
+    """Size of each effect's most visible variant from which it would stand out at `CLEAR`: sqrt(2 CLEAR) standard
+    deviations of what the scene may have of the same lines, with the errors of the lines. Where it shares its
+    line with something larger, it adds to that as chance has their angle: square to it, it shows less."""
     smallest: dict[str, float] = {}
     for effect in effects:
         sizes = []

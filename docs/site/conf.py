@@ -1,4 +1,5 @@
-"""The documentation as one static site: `make docs` builds it in out/site. References and pictures of effects are generated from the program."""
+"""The documentation as one static site: `make docs` builds it in out/site. References and pictures
+of effects are generated from the program."""
 
 import sys
 from pathlib import Path

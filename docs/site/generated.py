@@ -1,4 +1,5 @@
-"""Pages that are made from the program itself: the references of its files, from the forms that its loader checks, and the catalogue of effects."""
+"""Pages that are made from the program itself: the references of its files, from the forms that its
+loader checks, and the catalogue of effects."""
 
 from __future__ import annotations
 

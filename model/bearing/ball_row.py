@@ -5,8 +5,8 @@ K deformation**1.5 beyond the unloaded distance and none below (Jones 1960; Harr
 psi_j in its own r-z plane; the outer ring's displacement relative to the inner, (x, y, z, tilt_x, tilt_y), moves the outer
 centre there by u_r = x cos + y sin and u_z = z + arm (tilt_x sin - tilt_y cos). Forces are those needed on the outer ring.
 
-With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy_ball.balance`), and so is the speed of the cage, with which all balls orbit: the mean of what rolling at the angles of
-each would make it. What one ring is pushed aside with the other is then, too.
+With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy_ball.balance`), and so is the speed of the cage, with which
+all balls orbit: the mean of what rolling at the angles of each would make it. What one ring is pushed aside with the other is then, too.
 """
 
 from __future__ import annotations
@@ -199,8 +199,9 @@ def with_cage_held(row: BallRow) -> BallRow:
 
 
 def by_own_orbits(row: BallRow, displacement: Array | None = None) -> Array:
-    """What of the tangent stiffness (5, 5) at a displacement (5,) of the outer ring were another if every ball orbited as fast as it rolls by itself, and no cage held
-    them together (Jones 1960; Harris 1991, ch. 9, have each ball so); its symmetric part. Nothing where balls have no inertia, or a cage whose speed is held."""
+    """What of the tangent stiffness (5, 5) at a displacement (5,) of the outer ring were another if every ball
+    orbited as fast as it rolls by itself, and no cage held them together (Jones 1960; Harris 1991, ch. 9, have
+    each ball so); its symmetric part. Nothing where balls have no inertia, or a cage whose speed is held."""
     if row.inertia is None or not row.heavy or row.inertia.cage is not None:
         return np.zeros((5, 5))
     held = respond(row, displacement, respond(row).rolled)
@@ -217,7 +218,8 @@ def by_own_orbits(row: BallRow, displacement: Array | None = None) -> Array:
 def at_one_speed(
     row: BallRow, lines: Sequence[Vector], starts: Mapping[Vector, Vector] = MappingProxyType({}), near: float | None = None
 ) -> tuple[float, dict[Vector, tuple[Balance, Driven]]]:
-    """Speed of the cage, and what a ball is at every different one of `lines` (balls, 2) between the groove centres; balls on the same line, as of centred rings, are one. Balls are sought from
+    """Speed of the cage, and what a ball is at every different one of `lines` (balls, 2) between
+    the groove centres; balls on the same line, as of centred rings, are one. Balls are sought from
     their `starts`, and the speed from one that is `near`, as far as these are known."""
     free, weights = row.ball, Counter(lines)
     allowed = tolerances(row, max(hypot(r, z) for r, z in weights))
@@ -256,7 +258,8 @@ def at_one_speed(
 
 
 def tolerances(row: BallRow, longest: float) -> tuple[float, float]:
-    """Of the resultant on a settled ball (N), and of the stiffness added to the step of one that touches nothing (N/m); no groove centres are farther apart than `longest` (m)."""
+    """Of the resultant on a settled ball (N), and of the stiffness added to the step of one that
+    touches nothing (N/m); no groove centres are farther apart than `longest` (m)."""
     stretch, flung = max(LEAST_STRETCH, longest - row.unloaded_distance), row.ball.inertia.flung
     contact = row.constant * stretch**1.5
     tolerance, least = 1e-12 * contact + 1e-13 * flung, 1e-9 * row.constant * sqrt(stretch)

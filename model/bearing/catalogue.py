@@ -5,9 +5,10 @@ along the axis, with L^2 = (A cos a)^2 + (A sin a + z)^2,
 
     F(z) = n K (L - A)^1.5 (A sin a + z) / L .
 
-A rigid pair of two has its rows at z where F(z) is the preload. Its rigidity is 2 F'(z), and an external force F(2 z) unloads one of them, which
-has then moved back by z and the other forward by as much. So three numbers at each of three preloads tell A and n K: with 990 bearings of one
-catalogue the fit leaves 0.95 % rms at 15 degrees, 0.60 % at 25, and 2.7 % of the worst (`tests/literature/test_fag_catalogue.py` has five).
+A rigid pair of two has its rows at z where F(z) is the preload. Its rigidity is 2 F'(z), and an external
+force F(2 z) unloads one of them, which has then moved back by z and the other forward by as much. So three
+numbers at each of three preloads tell A and n K: with 990 bearings of one catalogue the fit leaves 0.95 %
+rms at 15 degrees, 0.60 % at 25, and 2.7 % of the worst (`tests/literature/test_fag_catalogue.py` has five).
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
 
 WORST = 0.08
-"""rms misfit (ln) beyond which three preloads are not those of one bearing: several times what the catalogues' own rounding and models leave."""
+"""rms misfit (ln) beyond which three preloads are not those of one bearing: several times what the
+catalogues' own rounding and models leave."""
 STARTS = (1e-4, 3e-4, 1e-3)  # m, of the unloaded distance
 REACH = 5.0  # ln, of both unknowns about their start
 

@@ -51,7 +51,8 @@ def centred(row: BallRow, centre: Vector | None = None) -> Centred:
 
 @lru_cache(maxsize=1024)
 def _of_all(balls: int, arm: float) -> tuple[Array, Array]:
-    """Sums over the balls of what their kinematics b (2, 5) make: of b_i b_k, (4, 25), by which a ball's stiffness (rr, rz, zr, zz) is the row's, and of b."""
+    """Sums over the balls of what their kinematics b (2, 5) make: of b_i b_k, (4, 25), by which a
+    ball's stiffness (rr, rz, zr, zz) is the row's, and of b."""
     b = kinematics_of(balls, arm)
     return np.einsum("jpk,jql->pqkl", b, b).reshape(4, 25), b.sum(axis=0)
 

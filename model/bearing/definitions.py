@@ -13,7 +13,8 @@ SENSE = {"back-to-back": (-1, 1), "face-to-face": (1, -1), "tandem": (1, 1)}
 
 @dataclass(frozen=True)
 class ToldAngle:
-    """The contact angle as a scene file tells it: `key` of its `row`, contact_angle_deg or free_contact_angle_deg, and the `value` (degrees) there."""
+    """The contact angle as a scene file tells it: `key` of its `row`, contact_angle_deg or
+    free_contact_angle_deg, and the `value` (degrees) there."""
 
     row: str
     key: str
@@ -77,8 +78,8 @@ class LinearBearing:
 class RollerBearing:
     """Cylindrical roller rows side by side at `z` (m): line contacts with a radial clearance, free along the axis.
 
-    `clearance` is the diametral one of the mounted bearing at the reference temperature, negative where its rollers are preloaded. Its rings
-    are regions of the section, or none, whose clearance then stays.
+    `clearance` is the diametral one of the mounted bearing at the reference temperature, negative where
+    its rollers are preloaded. Its rings are regions of the section, or none, whose clearance then stays.
     """
 
     name: str

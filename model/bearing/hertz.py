@@ -67,7 +67,8 @@ def ellipticity(curvature_difference: float) -> float:
 
 
 def _difference(log_k: float) -> tuple[float, float]:
-    """Curvature difference F of the ellipticity k and its derivative by ln k; those of K and E by the parameter are Abramowitz & Stegun, 17.3.29 to 30's."""
+    """Curvature difference F of the ellipticity k and its derivative by ln k; those of K and E by
+    the parameter are Abramowitz & Stegun, 17.3.29 to 30's."""
     k2, m = exp(2 * log_k), -expm1(-2 * log_k)
     first, second = float(scipy.special.ellipkm1(1 / k2)), float(scipy.special.ellipe(m))
     quotient = first / second
@@ -83,7 +84,8 @@ def _of_nearly_round() -> float:
 
 
 def _guessed(rest: float) -> float:
-    """ln ln k where ln(1 - F) is `rest`: the cubic between two knots with its slopes there, right to 1e-9, from where Newton's method takes a step."""
+    """ln ln k where ln(1 - F) is `rest`: the cubic between two knots with its slopes there, right
+    to 1e-9, from where Newton's method takes a step."""
     rests, values, slopes = _knots()
     i = bisect_right(rests, rest)
     if i == 0:

@@ -108,7 +108,8 @@ def kinematics(
 
 
 def rolling(angles: tuple[float, float], balls: int, ratio: float, inner_speed: float, outer_speed: float, angled: bool = True) -> Kinematics:
-    """Speeds of rolling elements without slip at contact `angles` (rad) with the inner and the outer race, `ratio` their diameter over the pitch diameter."""
+    """Speeds of rolling elements without slip at contact `angles` (rad) with the inner and the
+    outer race, `ratio` their diameter over the pitch diameter."""
     a_i, a_o = angles
     cage = outer_speed - (outer_speed - inner_speed) * (1 - ratio * np.cos(a_i)) / (1 + np.cos(a_i - a_o))
     spin = abs(outer_speed - cage) * (1 + ratio * np.cos(a_o)) / ratio
@@ -189,7 +190,8 @@ def _radial(bearing: str, cause: str, order: int, name: str, speed: float, kin: 
 def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], speed: float, highest_multiple: int = 3) -> list[Line]:
     """All lines of linear theory for k up to `highest_multiple`, multiples of Z and even ball orders alike, in order of frequency.
 
-    `speed` (rad/s) is the spindle's, of which what is unbalanced has its own ratio. Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
+    `speed` (rad/s) is the spindle's, of which what is unbalanced has its own ratio. Orders that
+    stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
     """
     found: list[Line] = []
     for name in (b.name for b in spindle.rolling):

@@ -1,8 +1,8 @@
 """How far rings move until their axial forces balance.
 
-Unknown are the axial movements of what carries rings and is rigid in itself, and of rings that slide on springs; the balance of the axial forces on each gives the
-equations. A spindle is preloaded as it is put together: at the reference every row has its preload, springs have theirs, joints hold what that asks of them, and
-from there on all give.
+Unknown are the axial movements of what carries rings and is rigid in itself, and of rings that slide on springs; the
+balance of the axial forces on each gives the equations. A spindle is preloaded as it is put together: at the reference
+every row has its preload, springs have theirs, joints hold what that asks of them, and from there on all give.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ BEYOND = 1.6  # of a step to where a force of the power 1.5 begins, more than wh
 
 
 def moved_rings(spindle: Spindle, rows: Mapping[str, BallRow], centres: Centres) -> dict[str, float]:
-    """Movement (m) of every row's outer ring against its inner one, where the axial forces on all carriers balance. `centres` keeps where balls settled. Raises `NoEquilibrium`."""
+    """Movement (m) of every row's outer ring against its inner one, where the axial forces on all
+    carriers balance. `centres` keeps where balls settled. Raises `NoEquilibrium`."""
     moved: dict[str, float] = {}
     for balance in balances(spindle):
         try:
@@ -45,8 +46,8 @@ def moved_rings(spindle: Spindle, rows: Mapping[str, BallRow], centres: Centres)
 class Balance:
     """What movements (m) along the axis balance, n of them: of parts that carry rings, and of rings that slide on springs.
 
-    A row's outer ring moves against its inner one by `motion` (rows, n) times the movements, in the order of `names`. `stiffness` (n, n) is that of springs and
-    joints, `force` (n,) what acts beside the rows and these where nothing has moved.
+    A row's outer ring moves against its inner one by `motion` (rows, n) times the movements, in the order of `names`.
+    `stiffness` (n, n) is that of springs and joints, `force` (n,) what acts beside the rows and these where nothing has moved.
     """
 
     names: tuple[str, ...]
@@ -61,8 +62,8 @@ class Balance:
 
 
 def balanced(balance: Balance, rows: Mapping[str, BallRow], centres: Centres) -> dict[str, float]:
-    """Movement (m) of every row's outer ring against its inner one without imbalance; that of balls with inertia is sought from the answer of balls without, whose
-    energy is convex. `centres` keeps where balls settled. Raises `NoEquilibrium`."""
+    """Movement (m) of every row's outer ring against its inner one without imbalance; that of balls with inertia is sought
+    from the answer of balls without, whose energy is convex. `centres` keeps where balls settled. Raises `NoEquilibrium`."""
     own = [rows[name] for name in balance.names]
     y = np.zeros(len(balance.force))
     if any(row.inertia is not None for row in own):
@@ -71,7 +72,8 @@ def balanced(balance: Balance, rows: Mapping[str, BallRow], centres: Centres) ->
 
 
 def _stepped(balance: Balance, y: Array, rows: list[BallRow], centres: Centres) -> Array:
-    """Newton's method. A row's force rises with its own movement: what is out of balance is the slope of an energy that is convex, of which every step finds less."""
+    """Newton's method. A row's force rises with its own movement: what is out of balance is the
+    slope of an energy that is convex, of which every step finds less."""
     here, last = _imbalance(balance, y, rows, centres), 0.0
     for _ in range(MOST):
         move = -_yielding(*here) @ here[0]
@@ -89,7 +91,8 @@ def _stepped(balance: Balance, y: Array, rows: list[BallRow], centres: Centres) 
 
 
 def _along(balance: Balance, y: Array, move: Array, slope: float, rows: list[BallRow], centres: Centres) -> tuple[float, tuple[Array, Array]]:
-    """The share of a step at which what is out of balance along it has become less than `STEEP` of what it was, the `slope` at its start; and the imbalance there."""
+    """The share of a step at which what is out of balance along it has become less than `STEEP` of
+    what it was, the `slope` at its start; and the imbalance there."""
     length = _largest(move)
     least, most, share = 0.0, np.inf, min(1.0, FARTHEST / length)
     while share * length < REACH and share - least > 1e-12 * share:
@@ -198,8 +201,8 @@ def _balance(spindle: Spindle, group: Sequence[Bearing]) -> Balance:
 
 
 def _load(spindle: Spindle, of: Mapping[str, tuple[str, str]], of_part: Mapping[str, Array]) -> Array:
-    """The axial load (n,), for bearings feel the motion between rings alone: on the one part that carries all outer rings, or its opposite on the one that carries all inner ones; of both, and of several, on what
-    turns, for joints hold what stands."""
+    """The axial load (n,), for bearings feel the motion between rings alone: on the one part that carries all outer rings, or
+    its opposite on the one that carries all inner ones; of both, and of several, on what turns, for joints hold what stands."""
     none = np.zeros_like(next(iter(of_part.values())))
     if not spindle.axial_load:
         return none

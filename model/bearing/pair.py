@@ -32,10 +32,9 @@ IN_CONTACT = "in contact"
 class BearingState(ByDirection):
     """One bearing at its operating point; forces in N, lengths in m, angles in rad.
 
-    `stiffness`, `damping`: (5, 5) between the inner and the outer body at the ring centre, order x, y, z, tilt_x, tilt_y.
-    `row` is the ball row at its loaded position, centred. `movement` is the rigid axial
-    movement of its outer ring against its inner one, beyond thermal expansion. `preload` is the axial force in the row's own sense: less than nothing where
-    a load turns it round.
+    `stiffness`, `damping`: (5, 5) between the inner and the outer body at the ring centre, order x, y, z, tilt_x, tilt_y. `row` is
+    the ball row at its loaded position, centred. `movement` is the rigid axial movement of its outer ring against its inner one,
+    beyond thermal expansion. `preload` is the axial force in the row's own sense: less than nothing where a load turns it round.
     """
 
     name: str
@@ -77,7 +76,8 @@ class PairState:
 
     @property
     def of_bearings(self) -> str:
-        """What a title says of the bearings: the status of ball rows, which names those that have lost contact itself; else what bearings there are."""
+        """What a title says of the bearings: the status of ball rows, which names those that have
+        lost contact itself; else what bearings there are."""
         if self.bearings:
             return f"bearings {self.status}" if self.status == IN_CONTACT else self.status
         kinds = {"roller bearings" if isinstance(b, RollerState) else "bearings given by numbers" for b in self.linear}
@@ -142,7 +142,8 @@ def contact_status(bearings: tuple[BearingState, ...]) -> str:
 
 
 def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | None = None, movement: float = 0.0) -> BearingState:
-    """What bearing `b` is with its balls as in `row`: centred rings at their loaded position, after a rigid `movement` (m) of the outer one.
+    """What bearing `b` is with its balls as in `row`: centred rings at their loaded position, after
+    a rigid `movement` (m) of the outer one.
 
     Its balls settle at or near `centre`, where one knows.
     """

@@ -1,8 +1,8 @@
 """Hertz pressure in the contacts of a bearing: the largest of its rolling elements', at the inner and the outer race.
 
-Of an elliptic point contact p = 3 Q / (2 pi a b), of a line contact p = sqrt(Q rho / (pi l s)) with rho the sum of curvatures and s the sum of (1 - nu^2) / E
-of both bodies (Harris, Rolling Bearing Analysis, 4th ed. 2001, ch. 6). Curvatures are those of the drawing, which heat changes by a
-thousandth; rollers are pressed alike over their length, so that neither tilt nor ends are in it.
+Of an elliptic point contact p = 3 Q / (2 pi a b), of a line contact p = sqrt(Q rho / (pi l s)) with rho the sum of curvatures and
+s the sum of (1 - nu^2) / E of both bodies (Harris, Rolling Bearing Analysis, 4th ed. 2001, ch. 6). Curvatures are those of the
+drawing, which heat changes by a thousandth; rollers are pressed alike over their length, so that neither tilt nor ends are in it.
 """
 
 from __future__ import annotations

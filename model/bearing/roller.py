@@ -1,16 +1,19 @@
 """Cylindrical roller rows: line contacts in slices along the rollers, with clearance, and their stiffness at a displacement.
 
-A roller that the rings press by d (both contacts) carries Q = c d^(10/9), c = 35 948 L^(8/9) in N and mm for steel (ISO/TS 16281:2008, 4.4, from
-Palmgren's 3.84e-5 Q^0.9 / L^0.8 mm a contact; Harris, Rolling Bearing Analysis, 4th ed. 2001, Eq. 6.54). Written Q = e E' L^2 (d / L)^(10/9),
-it holds for other moduli too. Each roller is cut into slices that respond by themselves (the lamina model of ISO/TS 16281), which gives the
-moment against tilt; its ends are taken as straight to the edge. With centred rings each roller is pressed by half the negative clearance.
+A roller that the rings press by d (both contacts) carries Q = c d^(10/9), c = 35 948 L^(8/9) in N and mm for steel
+(ISO/TS 16281:2008, 4.4, from Palmgren's 3.84e-5 Q^0.9 / L^0.8 mm a contact; Harris, Rolling Bearing Analysis, 4th
+ed. 2001, Eq. 6.54). Written Q = e E' L^2 (d / L)^(10/9), it holds for other moduli too. Each roller is cut into
+slices that respond by themselves (the lamina model of ISO/TS 16281), which gives the moment against tilt; its ends
+are taken as straight to the edge. With centred rings each roller is pressed by half the negative clearance.
 
-Rings that are displaced press some of the rollers, and which depends on where the cage stands: nobody knows that of a shaft at rest, and a turning one passes all places. Forces are those of rollers
-spread evenly over the load zone, the mean over all places of the cage (Sjovall's integral, slice by slice: Harris, ch. 7.4), smooth in the displacement; a single place has steps, for a
-roller that comes into contact is stiff at once, as d^(1/9). `with_cage_at` is such a place.
+Rings that are displaced press some of the rollers, and which depends on where the cage stands: nobody knows that of a
+shaft at rest, and a turning one passes all places. Forces are those of rollers spread evenly over the load zone, the mean
+over all places of the cage (Sjovall's integral, slice by slice: Harris, ch. 7.4), smooth in the displacement; a single
+place has steps, for a roller that comes into contact is stiff at once, as d^(1/9). `with_cage_at` is such a place.
 
-Clearance follows the races and the rollers: c(T) = c0 + 2 (u_outer - u_inner) - 2 D strain_roller, u the races' radial motions. Pressed
-rollers widen the outer race and narrow the inner one: c = c(T) + g sum(Q), g the races' give, with the loads of centred rings (rings stay round).
+Clearance follows the races and the rollers: c(T) = c0 + 2 (u_outer - u_inner) - 2 D strain_roller,
+u the races' radial motions. Pressed rollers widen the outer race and narrow the inner one: c = c(T)
++ g sum(Q), g the races' give, with the loads of centred rings (rings stay round).
 """
 
 from __future__ import annotations
@@ -38,7 +41,8 @@ _NODES, _SHARES = np.polynomial.legendre.leggauss(20)
 TURNS = 24
 """Places of the cage from one roller to the next at which a row is asked how far it departs from its mean."""
 EDGE = 4
-"""Places crowd at the edge of a load zone with this power, for stiffness goes there as the ninth root: integrals to 1e-11 (`tests/model/test_roller.py`)."""
+"""Places crowd at the edge of a load zone with this power, for stiffness goes there as the ninth
+root: integrals to 1e-11 (`tests/model/test_roller.py`)."""
 PLACES, SHARES = 1 - ((1 - _NODES) / 2) ** EDGE, _SHARES / 2 * EDGE * ((1 - _NODES) / 2) ** (EDGE - 1)
 """Places over half a load zone from its middle, and their shares."""
 
@@ -60,7 +64,8 @@ class RollerRow:
 
 @dataclass(frozen=True)
 class RollerForce:
-    """Answer at one displacement: `force` (5,) N, N m needed on the outer ring, its derivative `tangent` (5, 5), the sum of all contact loads (N)."""
+    """Answer at one displacement: `force` (5,) N, N m needed on the outer ring, its derivative
+    `tangent` (5, 5), the sum of all contact loads (N)."""
 
     force: Array
     tangent: Array
@@ -91,7 +96,8 @@ def line_constant(length: float, modulus: float = STEEL) -> float:
 
 
 def respond(row: RollerRow, displacement: Array | None = None) -> RollerForce:
-    """Forces and tangent at a displacement (5,) of the outer ring against the inner, order x, y, z, tilt_x, tilt_y: the mean over all places of the cage."""
+    """Forces and tangent at a displacement (5,) of the outer ring against the inner, order x, y, z,
+    tilt_x, tilt_y: the mean over all places of the cage."""
     zones = _Zones(row, np.zeros(5) if displacement is None else np.asarray(displacement, float))
     slope = zones.share * zones.pressed ** (EXPONENT - 1)
     load = slope * zones.pressed
@@ -106,8 +112,9 @@ def respond(row: RollerRow, displacement: Array | None = None) -> RollerForce:
 
 
 class _Zones:
-    """The load zone of every slice of a row, at heights (slices,): where the rings press deepest, (2, slices) cosine and sine, and over half of the zone, for the other half is the same, cosines from there, what
-    rollers are pressed by (m) and the constant that they have (N/m^(10/9)), (slices, places)."""
+    """The load zone of every slice of a row, at heights (slices,): where the rings press deepest, (2,
+    slices) cosine and sine, and over half of the zone, for the other half is the same, cosines from
+    there, what rollers are pressed by (m) and the constant that they have (N/m^(10/9)), (slices, places)."""
 
     def __init__(self, row: RollerRow, u: Array) -> None:
         self.height = (np.array(row.offsets)[:, None] + row.length / 2 * SLICES).ravel()
@@ -121,7 +128,8 @@ class _Zones:
 
 
 def with_cage_at(row: RollerRow, displacement: Array, turn: float) -> tuple[Array, Array, Array]:
-    """Force (5,), tangent (5, 5) and the load (rows, rollers) N of each roller at a displacement (5,), the first roller of each row `turn` rad from x."""
+    """Force (5,), tangent (5, 5) and the load (rows, rollers) N of each roller at a displacement
+    (5,), the first roller of each row `turn` rad from x."""
     azimuth, u = row.azimuths + turn, np.asarray(displacement, float)
     height = np.array(row.offsets)[:, None, None] + row.length / 2 * SLICES
     outward = np.zeros((len(row.offsets), row.rollers, SLICES.size, 5))  # radial motion of the outer ring by its displacement
@@ -135,7 +143,8 @@ def with_cage_at(row: RollerRow, displacement: Array, turn: float) -> tuple[Arra
 
 
 def cage_spread(row: RollerRow, displacement: Array) -> float:
-    """By how much of itself the radial stiffness of a row whose rings stand at a displacement (5,) departs, at most, from its mean where the cage is at some place; 0 of one that carries nothing."""
+    """By how much of itself the radial stiffness of a row whose rings stand at a displacement (5,)
+    departs, at most, from its mean where the cage is at some place; 0 of one that carries nothing."""
     mean = respond(row, displacement).tangent
     turns = 2 * np.pi / row.rollers * np.arange(TURNS) / TURNS
     off = [abs(with_cage_at(row, displacement, turn)[1][i, i] / mean[i, i] - 1) for turn in turns for i in (0, 1) if mean[i, i] > 0]
@@ -164,7 +173,8 @@ def roller_row(spindle: Spindle, b: RollerBearing, motion: RingMotion | None, te
 
 
 def eased(clearance: float, constant: float, give: float) -> float:
-    """Clearance (m) c = clearance + give constant (-c / 2)^(10/9) of rollers pressed between races that give; `constant` (N/m^(10/9)) of all rollers."""
+    """Clearance (m) c = clearance + give constant (-c / 2)^(10/9) of rollers pressed between races
+    that give; `constant` (N/m^(10/9)) of all rollers."""
     if clearance >= 0 or give == 0.0:
         return clearance
     return float(scipy.optimize.brentq(lambda c: c - clearance - give * constant * (-c / 2) ** EXPONENT, clearance, 0.0, xtol=1e-15, rtol=1e-12))

@@ -1,7 +1,7 @@
 """A ball row where its rings are at a temperature: its contacts, and the grooves moved by thermal expansion.
 
-Jang, Kim, Han, Kim (2003): contact angle and deformation from ring motion, Eqs. (1)-(5); load and deflection, Eq. (6). Besides the ball (Eq. 3)
-the grooves grow too, which makes a uniform expansion of everything leave the contact angle alone.
+Jang, Kim, Han, Kim (2003): contact angle and deformation from ring motion, Eqs. (1)-(5); load and deflection, Eq. (6).
+Besides the ball (Eq. 3) the grooves grow too, which makes a uniform expansion of everything leave the contact angle alone.
 """
 
 from __future__ import annotations
@@ -107,6 +107,7 @@ def ring_speeds(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> t
 
 
 def relative_speed(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> float:
-    """Speed (rad/s, not negative) of the rings of a bearing against each other: what its rolling elements and its lubricant know of the spindle's `speed`."""
+    """Speed (rad/s, not negative) of the rings of a bearing against each other: what its rolling
+    elements and its lubricant know of the spindle's `speed`."""
     inner, outer = ring_speeds(spindle, b, speed)
     return abs(inner - outer)

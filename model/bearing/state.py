@@ -16,8 +16,8 @@ ALIKE = 1e-6
 
 
 class ByDirection:
-    """The entries of a bearing's stiffness (5, 5) that have names. Those along x and about x hold along y and about y too, unless a radial load
-    or given numbers tell directions apart."""
+    """The entries of a bearing's stiffness (5, 5) that have names. Those along x and about x hold
+    along y and about y too, unless a radial load or given numbers tell directions apart."""
 
     stiffness: Array
 

@@ -30,8 +30,9 @@ from thermospindle.model.types import Array
 class Grade:
     """How well a spindle is made.
 
-    `balance`: G of ISO 21940-11 (m/s), at the part's own speed where the spindle turns at its nominal one; `ball_form`, `ball_lot`: deviation from spherical form and
-    variation of the lot diameter of ISO 3290-1 (m); `race`: rms amplitude (m) of order 2, falling as order ** -`decay`.
+    `balance`: G of ISO 21940-11 (m/s), at the part's own speed where the spindle turns at its
+    nominal one; `ball_form`, `ball_lot`: deviation from spherical form and variation of the lot
+    diameter of ISO 3290-1 (m); `race`: rms amplitude (m) of order 2, falling as order ** -`decay`.
     """
 
     balance: float

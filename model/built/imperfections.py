@@ -44,8 +44,8 @@ class RowImperfections:
 class Imperfections:
     """Imperfections of a spindle; the default is a perfect one.
 
-    `unbalance` (kg m) sits at height `unbalance_z` (m) on the turning body or shaft `unbalance_body`, empty where the height tells which (`model.carrier`);
-    `couple_unbalance` (kg m2) is a pair of opposite unbalances times their distance, its phase that of the upper one.
+    `unbalance` (kg m) sits at height `unbalance_z` (m) on the turning body or shaft `unbalance_body`, empty where the height tells which
+    (`model.carrier`); `couple_unbalance` (kg m2) is a pair of opposite unbalances times their distance, its phase that of the upper one.
     """
 
     unbalance: float = 0.0

@@ -1,4 +1,5 @@
-"""Files read by another process: the compiled libraries that read some kinds break off the process that they are in on damaged ones, or never come to an end."""
+"""Files read by another process: the compiled libraries that read some kinds break off the process
+that they are in on damaged ones, or never come to an end."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ LONGEST, SLOWEST = 60.0, 1e6
 
 
 def read_apart(file: Path, what: str, code: str, *arguments: str, ends: Sequence[int] = (0,)) -> subprocess.CompletedProcess[str]:
-    """How the Python `code` ended that reads a file of a kind (`what`, in the plural), with one of the exit codes `ends`. Raises `BadInput` for any other end, and for none."""
+    """How the Python `code` ended that reads a file of a kind (`what`, in the plural), with one of
+    the exit codes `ends`. Raises `BadInput` for any other end, and for none."""
     limit = LONGEST + file.stat().st_size / SLOWEST
     try:
         done = subprocess.run([sys.executable, "-P", "-c", code, *arguments], capture_output=True, text=True, errors="replace", timeout=limit)

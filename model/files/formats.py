@@ -22,7 +22,8 @@ Tables = dict[str, Any]
 
 
 def _one_arrangement(raw: Tables) -> Tables:
-    """Scenes before 2 could say `bearing_pair.stiffness_arrangement`: load lines of another pair than the one mounted, for the stiffness alone."""
+    """Scenes before 2 could say `bearing_pair.stiffness_arrangement`: load lines of another pair
+    than the one mounted, for the stiffness alone."""
     pair = raw.get("bearing_pair")
     if not isinstance(pair, Mapping) or "stiffness_arrangement" not in pair:
         return raw
@@ -45,7 +46,8 @@ MIGRATIONS: dict[tuple[str, int], Callable[[Tables], Tables]] = {(SCENE, 1): _on
 def migrated(kind: str, raw: Any, where: object) -> Any:
     """The tables `raw` of a file in today's format of its `kind`; what is no table is given back, for the file's reader to refuse.
 
-    Raises `BadInput`, naming the file by `where`, for a format that is none, that is newer than this program, or that cannot be carried over.
+    Raises `BadInput`, naming the file by `where`, for a format that is none, that is newer than
+    this program, or that cannot be carried over.
     """
     if not isinstance(raw, Mapping):
         return raw

@@ -1,8 +1,8 @@
 """Results kept on disk between runs: one file a result, named by the hash of its question and of the code that answers it.
 
-They stand in `THERMOSPINDLE_CACHE` (a folder; empty for none), by default `$XDG_CACHE_HOME/thermospindle`. Only a folder that nobody else can
-write to is used, and nothing in it is trusted that does not have its digest. Files that were not asked for longest go first when all of them
-together take more than `MOST_BYTES`. A file that is damaged, or a folder that cannot be written, costs time, never a result.
+They stand in `THERMOSPINDLE_CACHE` (a folder; empty for none), by default `$XDG_CACHE_HOME/thermospindle`. Only a folder that nobody else
+can write to is used, and nothing in it is trusted that does not have its digest. Files that were not asked for longest go first when all
+of them together take more than `MOST_BYTES`. A file that is damaged, or a folder that cannot be written, costs time, never a result.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def folder() -> Path | None:
 
 @cache
 def trusted(place: Path) -> bool:
-    """Whether nobody but this user (and root) could have put something into a folder: it and all above it are theirs, and none is open to others.
+    """Whether nobody but this user (and root) could have put something into a folder: it and all
+    above it are theirs, and none is open to others.
 
     One that is not is passed over, with a warning: what lies there could be anybody's, however right it looks. Where there are no owners
     (Windows) a folder is as safe as its place.
@@ -61,7 +62,8 @@ def code(package: Path) -> str:
 
 
 def read(kind: str, question: str, code: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
-    """Notes and arrays that the `code` (its text and versions) answered a question of some `kind` with, None where there are none; they count as asked for now."""
+    """Notes and arrays that the `code` (its text and versions) answered a question of some `kind`
+    with, None where there are none; they count as asked for now."""
     file = _file(kind, question, code)
     if file is None or not file.is_file():
         return None

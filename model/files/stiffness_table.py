@@ -54,8 +54,8 @@ BETWEEN = {
     "coupling_stiffness_z_tilt_y_N_per_rad": (2, 4),
     "tilt_stiffness_xy_N_m_per_rad": (3, 4),
 }
-"""Entries of the stiffness (5, 5) that centred rings do not have, each a column of a table with a bearing that has it: force or moment along the first direction of its name for a motion along
-the second. With those above the whole matrix is told."""
+"""Entries of the stiffness (5, 5) that centred rings do not have, each a column of a table with a bearing that has it: force
+or moment along the first direction of its name for a motion along the second. With those above the whole matrix is told."""
 NOTHING = 1e-12
 """Of sqrt(k_ii k_jj), where an entry k_ij is what rounding leaves of nothing."""
 PRESSURE = "contact_pressure_MPa"
@@ -101,7 +101,8 @@ def tabulate(
     temperatures: Sequence[float], speeds: Sequence[float], states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str],
     pressures: Sequence[Sequence[Mapping[str, float]]] = (),
 ) -> StiffnessTable:
-    """Table of pair states on a grid: `states[i][j]` at temperature i (C) and speed j (rad/s), and as many `pressures` (Pa, by bearing), or none."""
+    """Table of pair states on a grid: `states[i][j]` at temperature i (C) and speed j (rad/s), and
+    as many `pressures` (Pa, by bearing), or none."""
     bearings = states[0][0].all_bearings
     further = [of for kind, of in ((BearingState, OF_BALLS), (RollerState, OF_ROLLERS)) if any(isinstance(b, kind) for b in bearings)]
     every = [b for row in states for state in row for b in state.all_bearings]

@@ -1,8 +1,10 @@
-"""Long work that was stopped: what its parallel steps had computed, kept until the whole is done, so that the same work asked for again goes on from there.
+"""Long work that was stopped: what its parallel steps had computed, kept until the whole is done,
+so that the same work asked for again goes on from there.
 
-The parts of such work are asked for in the same order every time, each by a call of `in_parallel`; the results of every call are kept in a file of its own, in order. They
-are pickles, each with its digest, in the cache that only this user can write to (`kept`), in a folder whose name is the hash of all that they follow from: question, code,
-versions and number of workers. Work that takes less than `SOON` keeps nothing, and what was not asked for longest goes first where all of it takes more than `MOST_BYTES`.
+The parts of such work are asked for in the same order every time, each by a call of `in_parallel`; the results of every call are
+kept in a file of its own, in order. They are pickles, each with its digest, in the cache that only this user can write to (`kept`),
+in a folder whose name is the hash of all that they follow from: question, code, versions and number of workers. Work that takes
+less than `SOON` keeps nothing, and what was not asked for longest goes first where all of it takes more than `MOST_BYTES`.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ HEAD = 2 * LENGTH + hashlib.sha256().digest_size
 
 @contextmanager
 def going_on(question: bytes, told: Callable[[str], object]) -> Iterator[None]:
-    """Within it the results of `in_parallel` are kept until the end, and what a stopped run of the same `question` has kept is not computed again; `told` is what may be said of it."""
+    """Within it the results of `in_parallel` are kept until the end, and what a stopped run of the
+    same `question` has kept is not computed again; `told` is what may be said of it."""
     with ExitStack() as held:
         try:
             work = _folder(question)
@@ -59,7 +62,8 @@ def going_on(question: bytes, told: Callable[[str], object]) -> Iterator[None]:
 
 
 class _Pages:
-    """One file for the results of each call of `in_parallel`, by its number; nothing is written before `SOON`, and nothing any more once all of it is too much."""
+    """One file for the results of each call of `in_parallel`, by its number; nothing is written
+    before `SOON`, and nothing any more once all of it is too much."""
 
     def __init__(self, folder: Path, told: Callable[[str], object]) -> None:
         self.folder, self.told, self.began = folder, told, time.monotonic()
@@ -93,7 +97,8 @@ class _Pages:
 
 
 def _record(result: Any) -> bytes:
-    """Length in bytes, length of what is compressed in it, digest of all but itself, and that: zstd takes a third of the space of a fit, in a quarter of zlib's time."""
+    """Length in bytes, length of what is compressed in it, digest of all but itself, and that: zstd
+    takes a third of the space of a fit, in a quarter of zlib's time."""
     import pyarrow as pa  # takes its time to load: not where nothing is kept
 
     plain = packed(result)

@@ -31,7 +31,8 @@ NEW, OLD = "new", "old"
 
 
 def check_not_here(path: Path) -> None:
-    """`BadInput` where the folder in which one stands, or one above it, would be replaced: an empty name is such a one, too, and a shell would stand in what is gone."""
+    """`BadInput` where the folder in which one stands, or one above it, would be replaced: an empty
+    name is such a one, too, and a shell would stand in what is gone."""
     if path.is_dir() and (path := path.resolve()) in (here := Path.cwd(), *here.parents):
         raise BadInput(f"{path}: is where you stand, or above it, and would be replaced; name a new or empty folder")
 
@@ -62,7 +63,8 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def _exchange(path: Path, new: Path, old: Path) -> None:
-    """Put `new` in the place of `path`; `old` keeps what stood there, and goes back if `new` cannot be moved. Of several writers the last one's stays, whole."""
+    """Put `new` in the place of `path`; `old` keeps what stood there, and goes back if `new` cannot
+    be moved. Of several writers the last one's stays, whole."""
     old.parent.mkdir()
     for attempt in range(ATTEMPTS):
         moved = False
@@ -149,7 +151,8 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def _lock(folder: Path) -> int | None:
-    """A descriptor that holds the lock of a folder until it is closed or the process ends; `HELD` where another process has it or the folder is gone, and None where folders have no locks."""
+    """A descriptor that holds the lock of a folder until it is closed or the process ends; `HELD`
+    where another process has it or the folder is gone, and None where folders have no locks."""
     if fcntl is None:
         return None
     try:

@@ -1,21 +1,23 @@
 """Beam elements of flexible shafts: nodes that are bodies, joined by elements that are joints.
 
-Between two nodes a beam of any section that is its own mirror image in x and y is exactly a diagonal 5x5 stiffness at its elastic centre, between rigid arms: with
-z_c = integral(z / EI) / integral(1 / EI) the two free-end flexibilities of bending no longer couple, and
+Between two nodes a beam of any section that is its own mirror image in x and y is exactly a diagonal 5x5 stiffness at its elastic centre,
+between rigid arms: with z_c = integral(z / EI) / integral(1 / EI) the two free-end flexibilities of bending no longer couple, and
 
     1 / k_tilt    = integral(dz / EI)
     1 / k_lateral = integral((z - z_c)^2 / EI dz) + shear integral(dz / kappa G A)
     1 / k_axial   = integral(dz / EA),
 
-for a uniform Timoshenko beam 12 EI / (l^3 (1 + phi)), EI / l and EA / l at its middle (Przemieniecki, *Theory of Matrix Structural
-Analysis*, 1968, 5.6), with an I of its own in each of the two planes. Static answers are exact on any mesh, steps and tapers inside an element included.
+for a uniform Timoshenko beam 12 EI / (l^3 (1 + phi)), EI / l and EA / l at its middle
+(Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 5.6), with an I of its own in each of
+the two planes. Static answers are exact on any mesh, steps and tapers inside an element included.
 
-The mass of an element goes to its nodes by its linear shape functions, each share with its centre of mass moved inward by the first
-moment (l / 2) integral(rho A x (1 - x) dz), x from 0 to 1: for a uniform element half of m, moved by l / 6. This is the Euler-Maclaurin
-correction of the trapezoidal rule, without which a free end is of second order only: what is left there is the lump's own inertia about its
-node, m l^3 / 72 of it, of third. Inside a uniform beam the corrections of neighbours cancel, and bending frequencies of k l = c are right to
-c^4 / 1440, the size of the consistent mass's error with the other sign. Measured: the third bending frequency of a free shaft of 20 elements is
-0.09 % low, of 40 elements 0.011 % (`tests/model/test_beam.py`). Rotary inertia rho I (polar 2 rho I) is shared alike; none is added for the length of a lump.
+The mass of an element goes to its nodes by its linear shape functions, each share with its centre of mass moved inward by
+the first moment (l / 2) integral(rho A x (1 - x) dz), x from 0 to 1: for a uniform element half of m, moved by l / 6. This
+is the Euler-Maclaurin correction of the trapezoidal rule, without which a free end is of second order only: what is left
+there is the lump's own inertia about its node, m l^3 / 72 of it, of third. Inside a uniform beam the corrections of
+neighbours cancel, and bending frequencies of k l = c are right to c^4 / 1440, the size of the consistent mass's error with
+the other sign. Measured: the third bending frequency of a free shaft of 20 elements is 0.09 % low, of 40 elements 0.011 %
+(`tests/model/test_beam.py`). Rotary inertia rho I (polar 2 rho I) is shared alike; none is added for the length of a lump.
 """
 
 from __future__ import annotations
@@ -37,18 +39,20 @@ T = TypeVar("T", float, Array)
 
 PLACES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 SLIGHT = 1e-4
-"""Rotary inertia left to a node where its theory has none, over mass times length squared: MuJoCo wants some, bending frequencies move by half of it
-times (k l)^2."""
+"""Rotary inertia left to a node where its theory has none, over mass times length squared: MuJoCo
+wants some, bending frequencies move by half of it times (k l)^2."""
 
 
 def shear_factor(bore: T, poisson: float) -> T:
-    """Shear factor of a tube of radius ratio `bore` (a number or an array): Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech., 1966."""
+    """Shear factor of a tube of radius ratio `bore` (a number or an array): Cowper, The shear
+    coefficient in Timoshenko's beam theory, J. Appl. Mech., 1966."""
     m = (1 + bore**2) ** 2
     return 6 * (1 + poisson) * m / ((7 + 6 * poisson) * m + (20 + 12 * poisson) * bore**2)
 
 
 def second_moments(segment: Segment, ends: tuple[float, float], z: Array) -> tuple[Array, Array]:
-    """Area (m2), (m,), and the second moments of area (m4), (2, m), of x^2 and of y^2 at heights; `ends` are the outer radii at the segment's ends."""
+    """Area (m2), (m,), and the second moments of area (m4), (2, m), of x^2 and of y^2 at heights;
+    `ends` are the outer radii at the segment's ends."""
     if segment.sides is not None:
         width, height = segment.sides
         return np.full(len(z), width * height), np.repeat([[height * width**3 / 12], [width * height**3 / 12]], len(z), axis=1)
@@ -72,8 +76,8 @@ def with_shafts(structure: Structure, materials: Mapping[str, Material], tempera
 
 
 def at_temperature(structure: Structure, materials: Mapping[str, Material], reference: float, temperature: float) -> Structure:
-    """The structure, with moduli those at `reference` (C), at another temperature: the elements of shafts whose moduli change stiffer or softer by what their beam is, and joints in proportion to the
-    modulus of their material; as it is where none does."""
+    """The structure, with moduli those at `reference` (C), at another temperature: the elements of shafts whose moduli change
+    stiffer or softer by what their beam is, and joints in proportion to the modulus of their material; as it is where none does."""
     changed: dict[str, Joint] = {}
     joints = {j.name: j for j in structure.joints}
     for shaft in structure.shafts:
@@ -96,7 +100,8 @@ def _scaled(joint: Joint, before: Joint, after: Joint) -> Joint:
 def with_theory(
     structure: Structure, materials: Mapping[str, Material], temperature: float, shares: tuple[float, float] | Mapping[str, tuple[float, float]]
 ) -> Structure:
-    """The structure with other shares of shear and rotary inertia in the beams of its shafts (of all, or by name), all else of them as it stands.
+    """The structure with other shares of shear and rotary inertia in the beams of its shafts (of
+    all, or by name), all else of them as it stands.
 
     What has been added to a node or scaled in an element stays: only the change that the shares make is applied.
     """
@@ -145,9 +150,10 @@ def elements(shaft: Shaft, materials: Mapping[str, Material], temperature: float
 def _flexibilities(
     segments: tuple[Segment, ...], heights: tuple[float, ...], elastic: tuple[tuple[str, float, float], ...]
 ) -> tuple[tuple[float, tuple[float, float], float, float, tuple[float, float], str], ...]:
-    """Of every element its elastic centre (m), lateral flexibility in bending (in the planes of x and of y) and in shear, axial flexibility and that of tilt (in both planes),
-    and its material where it has but one; `elastic`: name, modulus and Poisson's ratio of every material. They do not know the beam theory, so that another one costs nothing.
-    The centre is the same in both planes: rectangular segments have a node at each end."""
+    """Of every element its elastic centre (m), lateral flexibility in bending (in the planes of x and of y) and in
+    shear, axial flexibility and that of tilt (in both planes), and its material where it has but one; `elastic`:
+    name, modulus and Poisson's ratio of every material. They do not know the beam theory, so that another one
+    costs nothing. The centre is the same in both planes: rectangular segments have a node at each end."""
     properties, found = {name: row for name, *row in elastic}, []
     for low, high in pairwise(heights):
         sheared, drawn = 0.0, 0.0  # integrals of 1/kappa G A and 1/EA
@@ -183,7 +189,8 @@ def nodes(shaft: Shaft, materials: Mapping[str, Material]) -> list[Body]:
 def _lumps(
     segments: tuple[Segment, ...], heights: tuple[float, ...], densities: tuple[tuple[str, float], ...]
 ) -> tuple[tuple[float, float, tuple[float, float], float], ...]:
-    """Of every node the height of its centre of mass (m), mass, rotary inertia of its sections in the planes of x and of y, and the least inertia that it is given."""
+    """Of every node the height of its centre of mass (m), mass, rotary inertia of its sections in
+    the planes of x and of y, and the least inertia that it is given."""
     mass, first, least = np.zeros((3, len(heights)))
     rotary = np.zeros((len(heights), 2))
     density = dict(densities)

@@ -108,7 +108,8 @@ def rotor_base(spindle: Spindle, state: PairState) -> RotorBase:
 
 
 def sprung(chain: RotorBase, names: Sequence[str], rate: float, mass: float) -> RotorBase:
-    """The chain with the rings of bearings on one lossless axial spring of `rate` (N/m); they move across the axis and tilt with their body.
+    """The chain with the rings of bearings on one lossless axial spring of `rate` (N/m); they move
+    across the axis and tilt with their body.
 
     A ring without mass is condensed: K - K_z K_z^T / (rate + k_zz), damping to first order of complex stiffness. ValueError for
     several without mass.
@@ -225,8 +226,8 @@ def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
 
 
 def losses(chain: RotorBase, at: Matrices) -> Array:
-    """What loses energy in a chain (3, n, n): the imaginary part of the complex stiffness K + i H that loss factors are (Bishop, *J. R. Aeronaut. Soc.* 59 (1955) 738), the damping that its
-    matrices `at` have for it, and that of its dampers."""
+    """What loses energy in a chain (3, n, n): the imaginary part of the complex stiffness K + i H that loss factors are
+    (Bishop, *J. R. Aeronaut. Soc.* 59 (1955) 738), the damping that its matrices `at` have for it, and that of its dampers."""
     n = len(chain.dofs)
     dampers = _felt(chain, n)[0] if chain.elements else np.zeros((n, n))
     constant, by_loss = np.zeros((2, n, n))
@@ -238,8 +239,9 @@ def losses(chain: RotorBase, at: Matrices) -> Array:
 
 @lru_cache(maxsize=64)
 def _places(layout: Layout, elements: tuple[tuple[str, str, float, str], ...]) -> tuple[Array, Integers]:
-    """Rows (elements, 5, w) of the relative motion that each element (a, b, z, slides) resists, over the w degrees of freedom of its ends, and the place
-    (2 elements w w,) of each of its terms in one of two whole matrices after each other; fewer than w are filled up with zeros at place 0."""
+    """Rows (elements, 5, w) of the relative motion that each element (a, b, z, slides) resists,
+    over the w degrees of freedom of its ends, and the place (2 elements w w,) of each of its terms
+    in one of two whole matrices after each other; fewer than w are filled up with zeros at place 0."""
     first, at = {"ground": range(0)}, 0
     for name, _, moves in layout:
         first[name] = range(at, at + len(moves))

@@ -1,14 +1,16 @@
 """The mass of flexible shafts where it is: what lumps at nodes leave out, for those who measure more finely than a mesh.
 
-A chain's masses sit at its nodes (`beam`), which MuJoCo steps. Between nodes a beam moves by its static shapes, with which the mass that is spread along
-an element makes the consistent matrix M (Archer, *AIAA J.* 3 (1965) 1910), and by what its own inertia bends and shears it between them, which makes the next
-term of the dynamic stiffness K + s^2 M - s^4 N (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 11.5). Lumps are right to the second order
-in an element's length where forces act on a shaft that shears, as those of bearings do, and this to the fourth. Moduli are those
-at one temperature: M knows only their ratios, and N, itself of the fourth order, goes with their inverse.
+A chain's masses sit at its nodes (`beam`), which MuJoCo steps. Between nodes a beam moves by its static shapes, with
+which the mass that is spread along an element makes the consistent matrix M (Archer, *AIAA J.* 3 (1965) 1910), and
+by what its own inertia bends and shears it between them, which makes the next term of the dynamic stiffness K + s^2
+M - s^4 N (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 11.5). Lumps are right to the second order in
+an element's length where forces act on a shaft that shears, as those of bearings do, and this to the fourth. Moduli
+are those at one temperature: M knows only their ratios, and N, itself of the fourth order, goes with their inverse.
 
-It is not what MuJoCo steps, and so not `OperatingPoint.linear`. M alone is no nearer than lumps: the frequencies of `five_bearing` near 4.15 kHz are 1.3e-3 high with it,
-6e-4 low with lumps and 6e-6 off with N, those of `mk7702` at 4.08 kHz 1.4e-3, 1.1e-3 and 6e-6. Nor could it be stepped: the armature of a tendon between
-bodies that hang on the world by themselves comes onto the diagonal of MuJoCo's mass matrix alone, and its accelerations are then wrong (4.0.0).
+It is not what MuJoCo steps, and so not `OperatingPoint.linear`. M alone is no nearer than lumps: the frequencies of
+`five_bearing` near 4.15 kHz are 1.3e-3 high with it, 6e-4 low with lumps and 6e-6 off with N, those of `mk7702` at 4.08
+kHz 1.4e-3, 1.1e-3 and 6e-6. Nor could it be stepped: the armature of a tendon between bodies that hang on the world by
+themselves comes onto the diagonal of MuJoCo's mass matrix alone, and its accelerations are then wrong (4.0.0).
 """
 
 from __future__ import annotations
@@ -32,8 +34,9 @@ PLANES = (("x", "tilt_y", 1.0), ("y", "tilt_x", -1.0))
 
 
 def spread(structure: Structure, materials: Mapping[str, Material], temperature: float, layout: Layout) -> tuple[Array, Array, Array]:
-    """What to add to a chain's mass matrix, the matrix N, and, for each rad/s of spindle speed, what to add to the damping matrix with gyroscopic terms, (n, n)
-    each over the degrees of freedom of `layout`, for the masses of the shafts to be where they are; moduli are those at `temperature` (C). Read only."""
+    """What to add to a chain's mass matrix, the matrix N, and, for each rad/s of spindle speed, what to
+    add to the damping matrix with gyroscopic terms, (n, n) each over the degrees of freedom of `layout`,
+    for the masses of the shafts to be where they are; moduli are those at `temperature` (C). Read only."""
     used = {segment.material: materials[segment.material] for shaft in structure.shafts for segment in shaft.segments}
     return _spread(structure.shafts, tuple(used.items()), temperature, layout)
 
@@ -86,10 +89,11 @@ def _spread(
 
 
 def _element(shaft: Shaft, low: float, high: float, materials: Mapping[str, Material], temperature: float, plane: int) -> tuple[Array, ...]:
-    """Consistent mass (4, 4) of the deflections and slopes (w, w', ...) of both ends in one of `PLANES`, rotary inertia alike, and N of both; mass (2, 2)
-    along the axis, and N of it.
+    """Consistent mass (4, 4) of the deflections and slopes (w, w', ...) of both ends in one of
+    `PLANES`, rotary inertia alike, and N of both; mass (2, 2) along the axis, and N of it.
 
-    Between its ends a beam without load has the shear force Q and the moment M - Q x, and EI slope' is the moment, w' = slope + shear force / (kappa G A).
+    Between its ends a beam without load has the shear force Q and the moment M - Q x, and EI slope'
+    is the moment, w' = slope + shear force / (kappa G A).
     """
     rows = []
     for segment in shaft.segments:

@@ -28,8 +28,8 @@ def frf(
 ) -> ComplexArray:
     """Exact FRF (n_resp, n_ref, n_freq) between response rows (n_resp, n) and force rows (n_ref, n) at `frequency` (Hz).
 
-    `kind`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N. With the mass `between` nodes of shafts it is that of the reduced model, whose modes know nothing of it: 3e-4 of the largest
-    off at the highest lines, where masses at nodes are off by percents.
+    `kind`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N. With the mass `between` nodes of shafts it is that of the reduced
+    model, whose modes know nothing of it: 3e-4 of the largest off at the highest lines, where masses at nodes are off by percents.
     """
     rows, columns, at = np.atleast_2d(response), np.atleast_2d(reference), np.asarray(2j * np.pi * np.atleast_1d(frequency), complex)
     if between is not None:
@@ -63,7 +63,8 @@ def _between_nodes(linear: Matrices, between: Between, response: Array, referenc
 
 
 def _solved(linear: Matrices, response: Array, reference: Array, s: ComplexArray, power: int, quartic: Array | float = 0.0) -> ComplexArray:
-    """s^power times response (n_resp, n) (s^2 M + s C + K - s^4 N)^-1 reference^T (n_ref, n), line by line (n_freq,), which asks nothing of the poles; N is `quartic`."""
+    """s^power times response (n_resp, n) (s^2 M + s C + K - s^4 N)^-1 reference^T (n_ref, n), line
+    by line (n_freq,), which asks nothing of the poles; N is `quartic`."""
     parts = []
     for at in np.array_split(s, max(len(s) // LINES, 1)):
         x = at[:, None, None]

@@ -1,8 +1,10 @@
-"""Bearings under radial loads and the spindle's weight: the whole spindle in equilibrium, each row displaced and tilted as the structure lets it.
+"""Bearings under radial loads and the spindle's weight: the whole spindle in equilibrium, each row
+displaced and tilted as the structure lets it.
 
-Unknown are the motions u of all bodies from the preloaded state, in which everything is balanced: K u + sum over the rows of B^T (f(B u) - f(0)) = F,
-K the stiffness of joints, beams and bearings given by numbers, B the motion of a row's outer ring against its inner one, f its forces. Shares
-of the load follow. Without ball inertia all energies are convex, so that the answer is unique; it is where the search for heavy balls begins.
+Unknown are the motions u of all bodies from the preloaded state, in which everything is balanced: K u + sum
+over the rows of B^T (f(B u) - f(0)) = F, K the stiffness of joints, beams and bearings given by numbers, B
+the motion of a row's outer ring against its inner one, f its forces. Shares of the load follow. Without ball
+inertia all energies are convex, so that the answer is unique; it is where the search for heavy balls begins.
 """
 
 from __future__ import annotations
@@ -35,7 +37,8 @@ SLACK = 1.0
 
 @dataclass(frozen=True)
 class _Row:
-    """A row in the structure: `b` (5, n) as above; force and tangent of its displacement, these `light` without ball inertia, and so its `energy`."""
+    """A row in the structure: `b` (5, n) as above; force and tangent of its displacement, these
+    `light` without ball inertia, and so its `energy`."""
 
     name: str
     b: Array
@@ -45,10 +48,11 @@ class _Row:
 
 
 def loaded(spindle: Spindle, state: PairState) -> PairState:
-    """The state with its rows where the scene's radial loads, and the weight of a spindle that lies, displace them; the state itself where there are none.
+    """The state with its rows where the scene's radial loads, and the weight of a spindle that
+    lies, displace them; the state itself where there are none.
 
-    Stiffness is the tangent there, forces those of the most loaded ball or roller; bearings given by numbers bear their share and stay as stiff. Rings on a spring slide, without friction, as far as their rows
-    push them. Raises `NoEquilibrium` where nothing bears the load.
+    Stiffness is the tangent there, forces those of the most loaded ball or roller; bearings given by numbers bear their share and stay as
+    stiff. Rings on a spring slide, without friction, as far as their rows push them. Raises `NoEquilibrium` where nothing bears the load.
     """
     if not spindle.loaded_across:
         return state
@@ -59,7 +63,8 @@ def loaded(spindle: Spindle, state: PairState) -> PairState:
 
 
 def motion(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array]:
-    """The chain at a centred state, and the motion (n,) of its degrees of freedom under the scene's radial loads and weight; raises as `loaded`."""
+    """The chain at a centred state, and the motion (n,) of its degrees of freedom under the scene's
+    radial loads and weight; raises as `loaded`."""
     chain = rotor_base(_rings_apart(spindle), state)
     rows = [_ball(chain, b) for b in state.bearings] + [_roller(chain, b) for b in state.linear if isinstance(b, RollerState)]
     own = {row.name for row in rows}
@@ -71,7 +76,8 @@ def motion(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array]:
 
 
 def _rings_apart(spindle: Spindle) -> Spindle:
-    """With every ring on a spring as a body of its own, of some mass, which no balance asks for; one without a rate keeps its force, and has next to none."""
+    """With every ring on a spring as a body of its own, of some mass, which no balance asks for;
+    one without a rate keeps its force, and has next to none."""
     mass = float(np.median([b.mass for b in spindle.structure.bodies]))
 
     def free(s: BearingSet) -> BearingSet:
@@ -110,10 +116,12 @@ def _rows(chain: RotorBase, name: str) -> Array:
 
 
 def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, size: float) -> Array:
-    """Motion (n,) under a load (n,) of `size` N: Newton's method on the balance without ball inertia, or the least potential where that does not arrive, then with it.
+    """Motion (n,) under a load (n,) of `size` N: Newton's method on the balance without ball
+    inertia, or the least potential where that does not arrive, then with it.
 
-    With any stiffness of the rows added to K, the balance has the load and forces along the rows alone at its right: u lies in the span of what these do to that structure, and all is
-    sought there, in some thirty unknowns whatever the number of elements (the dual of substructuring: Farhat & Roux 1991, *Int. J. Numer. Meth. Eng.* 32, 1205).
+    With any stiffness of the rows added to K, the balance has the load and forces along the rows alone at its right:
+    u lies in the span of what these do to that structure, and all is sought there, in some thirty unknowns whatever
+    the number of elements (the dual of substructuring: Farhat & Roux 1991, *Int. J. Numer. Meth. Eng.* 32, 1205).
     """
     firm = stiffness + sum((row.b.T @ (np.trace(stiffness) / len(mass) * row.b) for row in rows), start=np.zeros_like(stiffness))
     held = firmly(firm, load)

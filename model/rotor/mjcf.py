@@ -1,9 +1,10 @@
 """The rotor-base chain as a MuJoCo model.
 
-Every body moves on its own slides and hinges from the world; elements are fixed tendons. A positive 5x5 matrix between two bodies is
-exactly one tendon for each eigenvector, with the eigenvalue as stiffness; hammers pull and vibrometers look along tendons with the
-point's row; the dampers of loss factors (`loss`) are tendons over the whole chain. The turning body hangs by a spin hinge on a carrier that does not turn, which keeps spin out of the bearings and
-gives MuJoCo's own gyroscopic terms; probes look at the carrier, as a laser fixed in space does.
+Every body moves on its own slides and hinges from the world; elements are fixed tendons. A positive 5x5 matrix
+between two bodies is exactly one tendon for each eigenvector, with the eigenvalue as stiffness; hammers pull and
+vibrometers look along tendons with the point's row; the dampers of loss factors (`loss`) are tendons over the
+whole chain. The turning body hangs by a spin hinge on a carrier that does not turn, which keeps spin out of the
+bearings and gives MuJoCo's own gyroscopic terms; probes look at the carrier, as a laser fixed in space does.
 
 Bearing elements: "linear" is the 5x5 stiffness; "ball-by-ball" has a spatial tendon for each ball (Hertz force, no push) and a linear
 remainder that makes both linearise to the same matrix (see `model.bearing.springs`). Damping is linear in both.
@@ -32,7 +33,8 @@ CARRIER_SHARE = 1e-9  # of the turning body's inertia, left on the carrier becau
 def spec(spindle: Spindle, state: PairState, element: str = "linear", looks: bool = False, chain: RotorBase | None = None) -> mujoco.MjSpec:
     """The MuJoCo specification of a spindle at one operating point, with keyframe "loaded" (turning at its speed).
 
-    `chain` is the spindle's own at `state` by default. `looks` adds what a person wants to see (`model.rotor.look`) and changes nothing that moves.
+    `chain` is the spindle's own at `state` by default. `looks` adds what a person wants to see
+    (`model.rotor.look`) and changes nothing that moves.
     """
     if element not in ELEMENTS:
         raise ValueError(f"bearing element {element!r} is unknown; allowed are {', '.join(ELEMENTS)}")
@@ -198,7 +200,8 @@ def _add_points(out: mujoco.MjSpec, spindle: Spindle, chain: RotorBase) -> None:
 
 
 def spin_speeds(chain: RotorBase, speed: float) -> dict[str, float]:
-    """Speed (rad/s) of every spin hinge where the spindle turns at `speed`: each turning body has its own ratio. In the order of `spin_dofs`."""
+    """Speed (rad/s) of every spin hinge where the spindle turns at `speed`: each turning body has
+    its own ratio. In the order of `spin_dofs`."""
     return {f"{body.name}.spin": speed * body.speed_ratio for body in chain.bodies if body.turns}
 
 
@@ -214,9 +217,9 @@ STEP = 2e-9
 def linearise(model: mujoco.MjModel) -> Matrices:
     """M, C + G, K about the keyframe "loaded", by central differences of MuJoCo's accelerations; spin is left out.
 
-    For linear elements the result is exact to rounding. The force of a ball goes with the
-    power 1.5 of its deformation d, and a central difference by a step h is off by (h / d)^2 / 24: of those by `STEP` and by twice as
-    much the extrapolated limit is taken (Richardson), which is off by some (h / d)^4, 1e-7 where a ball has all but lost contact, at 0.1 um.
+    For linear elements the result is exact to rounding. The force of a ball goes with the power 1.5 of its deformation d,
+    and a central difference by a step h is off by (h / d)^2 / 24: of those by `STEP` and by twice as much the extrapolated
+    limit is taken (Richardson), which is off by some (h / d)^4, 1e-7 where a ball has all but lost contact, at 0.1 um.
     """
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("loaded").id)

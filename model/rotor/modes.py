@@ -20,8 +20,8 @@ LINE, LESSER = 0.04, 0.05
 class Mode:
     """One mode: pole = -damping_ratio w + i w sqrt(1 - damping_ratio^2) with w = 2 pi frequency.
 
-    `shape` (n,) complex over the dofs, largest element 1; `energy`: share of the strain energy in every element, sum 1;
-    `kind`: axial, rocking or lateral; `whirl`: forward, backward, mixed (forward at one place, backward at another) or none, of all that turns.
+    `shape` (n,) complex over the dofs, largest element 1; `energy`: share of the strain energy in every element, sum 1; `kind`: axial,
+    rocking or lateral; `whirl`: forward, backward, mixed (forward at one place, backward at another) or none, of all that turns.
     """
 
     frequency: float  # Hz, undamped

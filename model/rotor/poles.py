@@ -26,7 +26,8 @@ PARALLEL = 1e10
 """Condition of a block's vectors, from which a sum over its poles would have less than six digits."""
 
 Between = tuple[Array, Array, Array]
-"""What the mass between nodes of shafts adds to M, the matrix N beside it, and what it adds to C + G (`model.rotor.distributed`), (n, n) each."""
+"""What the mass between nodes of shafts adds to M, the matrix N beside it, and what it adds to C +
+G (`model.rotor.distributed`), (n, n) each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,8 @@ class Poles:
 
     @property
     def parallel(self) -> bool:
-        """Whether vectors of two poles are one to rounding, as of a body that nothing holds, nor damps: its double pole at zero has a single vector, and FRFs are no sum over poles."""
+        """Whether vectors of two poles are one to rounding, as of a body that nothing holds, nor
+        damps: its double pole at zero has a single vector, and FRFs are no sum over poles."""
         size = np.abs(self.value)
         return bool((size <= FREE * size.max()).any() and any(np.linalg.cond(b.vectors, 1) > PARALLEL for b in self.blocks))
 
@@ -116,9 +118,9 @@ def _poles(mass: Array, damping: Array, stiffness: Array, own: Integers) -> tupl
 
 
 def with_mass_between(linear: Matrices, between: Between | None) -> Poles:
-    """Poles p of K + s C + s^2 M - s^4 N, in the order of those without N, which left p^4 N right moves to first order (Lancaster 1964, *AIAA J.* 2, 1659). Of an undamped
-    mode that is -w^2 n w / 2 with n of N for a mass of one, and w / sqrt(1 + w^2 n) is taken: right where N is, for modes far below those of one element, and no mode above
-    falls among these."""
+    """Poles p of K + s C + s^2 M - s^4 N, in the order of those without N, which left p^4 N right moves to first order
+    (Lancaster 1964, *AIAA J.* 2, 1659). Of an undamped mode that is -w^2 n w / 2 with n of N for a mass of one, and w /
+    sqrt(1 + w^2 n) is taken: right where N is, for modes far below those of one element, and no mode above falls among these."""
     if between is None:
         return poles(linear)
     mass, quartic, damping = between
@@ -127,22 +129,23 @@ def with_mass_between(linear: Matrices, between: Between | None) -> Poles:
 
 
 def poles_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray]:
-    """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m); of a flexible shaft by
-    its reduced model, where `highest` is finite, and with its mass where it is and not at nodes, where that is told."""
+    """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m); of a
+    flexible shaft by its reduced model, where `highest` is finite, and with its mass where it is and not at nodes, where that is told."""
     value, right, _ = _below(linear, highest, highest, FINE, between, False)
     return value, right
 
 
 def vectors_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """The same, with their left vectors (m, n), scaled as those of `Poles`; of a flexible shaft those up to half of `highest` to 1e-5, the rest to 1e-4."""
+    """The same, with their left vectors (m, n), scaled as those of `Poles`; of a flexible shaft
+    those up to half of `highest` to 1e-5, the rest to 1e-4."""
     return _below(linear, highest, highest / 2, HALF, between, True)
 
 
 def _below(
     linear: Matrices, highest: float, band: float, sizes: tuple[float, float], between: Between | None, lefts: bool
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """What these two return, left vectors (0, n) where none are asked for. Large chains by reduced models of each part that moves by itself, so that equal modes of two planes stay in their planes; those
-    are for a `band` (Hz), with `sizes` of what they leave out."""
+    """What these two return, left vectors (0, n) where none are asked for. Large chains by reduced models of each part that moves by
+    itself, so that equal modes of two planes stay in their planes; those are for a `band` (Hz), with `sizes` of what they leave out."""
     n, first = len(linear.mass), 0
     if n <= LARGE or not np.isfinite(highest):
         whole = with_mass_between(linear, between)
@@ -173,9 +176,9 @@ def _below(
 def oscillating(p: Poles, highest: float = np.inf, stiffest: float = 0.0) -> list[int]:
     """Indices of the oscillating poles below `highest` (Hz), one of each conjugate pair, in order of frequency.
 
-    A body that nothing holds, as a hub whose bearings have lost contact, moves without oscillating: its double pole at zero comes
-    out as a pair of the size sqrt(rounding) of `stiffest` (rad/s), the highest undamped frequency of the whole model, by default the largest of the poles, which a damper of
-    light parts makes larger than that.
+    A body that nothing holds, as a hub whose bearings have lost contact, moves without oscillating: its double pole
+    at zero comes out as a pair of the size sqrt(rounding) of `stiffest` (rad/s), the highest undamped frequency of
+    the whole model, by default the largest of the poles, which a damper of light parts makes larger than that.
     """
     size = np.abs(p.value)
     least = max(FREE * (stiffest or size.max()), ROUNDING * size.max())
@@ -185,7 +188,8 @@ def oscillating(p: Poles, highest: float = np.inf, stiffest: float = 0.0) -> lis
 
 @dataclass(frozen=True)
 class Lost:
-    """How many natural frequencies rounding hides: undamped ones below `below` (Hz) beside the `stiffest` (Hz), and not of a motion that nothing holds."""
+    """How many natural frequencies rounding hides: undamped ones below `below` (Hz) beside the
+    `stiffest` (Hz), and not of a motion that nothing holds."""
 
     count: int
     below: float
@@ -201,6 +205,7 @@ def lost_to_rounding(linear: Matrices) -> Lost:
 
 
 def stiffest_of(linear: Matrices) -> float:
-    """Bound (rad/s) on the highest undamped frequency of a chain: the largest sum of a row of M^-1/2 K M^-1/2 (Gershgorin 1931), which is that or little more."""
+    """Bound (rad/s) on the highest undamped frequency of a chain: the largest sum of a row of
+    M^-1/2 K M^-1/2 (Gershgorin 1931), which is that or little more."""
     root = np.sqrt(np.abs(np.diag(linear.mass)))
     return float(np.sqrt(np.abs(linear.stiffness / np.outer(root, root)).sum(axis=1).max(initial=0.0)))

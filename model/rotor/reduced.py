@@ -1,11 +1,12 @@
 """A reduced basis for the response of a flexible shaft within a band: fewer degrees of freedom, with an error that is known.
 
-Galerkin: q = Q a, with M, C, K projected on the columns of Q. Q holds the undamped modes below `BEYOND` times the band and, of all modes above
-together, the static answer to a force on every row asked for (residual flexibility: MacNeal 1971, *Comput. Struct.* 1, 581) and to the damping and
-gyroscopic forces of the modes kept, then what inertia, damping and gyroscopic forces make of these answers in turn (a second-order Krylov space: Bai &
-Su 2005, *SIAM J. Matrix Anal. Appl.* 26, 640); of the whole what is larger than `SMALL` of the largest. What is left out enters an FRF by the product of
-the errors of a force's and of a point's field: measured on `five_bearing` and `mk7702`, at rest and at 12,000 rpm, an FRF is off by at most 1e-5 of
-the largest response at the same frequency (`tests/model/test_reduced.py`). Derivatives by any change of M, C and K are those of the reduced model.
+Galerkin: q = Q a, with M, C, K projected on the columns of Q. Q holds the undamped modes below `BEYOND` times the band and, of
+all modes above together, the static answer to a force on every row asked for (residual flexibility: MacNeal 1971, *Comput.
+Struct.* 1, 581) and to the damping and gyroscopic forces of the modes kept, then what inertia, damping and gyroscopic forces make
+of these answers in turn (a second-order Krylov space: Bai & Su 2005, *SIAM J. Matrix Anal. Appl.* 26, 640); of the whole what is
+larger than `SMALL` of the largest. What is left out enters an FRF by the product of the errors of a force's and of a point's
+field: measured on `five_bearing` and `mk7702`, at rest and at 12,000 rpm, an FRF is off by at most 1e-5 of the largest response
+at the same frequency (`tests/model/test_reduced.py`). Derivatives by any change of M, C and K are those of the reduced model.
 """
 
 from __future__ import annotations
@@ -18,11 +19,13 @@ from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.types import Array
 
 BEYOND, SMALL = 1.5, 1e-4
-"""Modes up to so many times the band are kept as they are; of the answers of those above what is smaller than this share of the largest is left out."""
+"""Modes up to so many times the band are kept as they are; of the answers of those above what is
+smaller than this share of the largest is left out."""
 FINE = 2.0, 1e-5
 """The same for modes and their shapes: frequencies in the band to 1e-9 where masses are at nodes."""
 HALF = 2.0, 1e-4
-"""The same for modes up to twice the band, those within it to 1e-5: `five_bearing` at 8000 rpm has a basis of 56 then, and of 88 with `FINE` for all."""
+"""The same for modes up to twice the band, those within it to 1e-5: `five_bearing` at 8000 rpm has
+a basis of 56 then, and of 88 with `FINE` for all."""
 ORDER = 2  # of the answers of the modes above
 
 

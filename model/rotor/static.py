@@ -1,8 +1,8 @@
 """Static answers of a spindle: stiffness at its points, what its bearings carry, and which part gives how much.
 
-K u = f for a unit force at a point. By Clapeyron's theorem the compliance at the point is twice the strain energy, so that the shares of energy are
-the shares of compliance. Where the whole may move freely, as along the axis or as a shaft that nothing holds, a force that does work on that
-motion has no static answer; any other has, and the free motion stays out of it.
+K u = f for a unit force at a point. By Clapeyron's theorem the compliance at the point is twice the strain energy, so that
+the shares of energy are the shares of compliance. Where the whole may move freely, as along the axis or as a shaft that
+nothing holds, a force that does work on that motion has no static answer; any other has, and the free motion stays out of it.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def static(spindle: Spindle, chain: RotorBase, point: Point) -> Static:
 
 @dataclass(frozen=True)
 class Around:
-    """Answers at one point: its `own`, of a force on the axis along it at the point's height, and `across`, the other way across the axis, None of a
-    point that measures along it."""
+    """Answers at one point: its `own`, of a force on the axis along it at the point's height, and
+    `across`, the other way across the axis, None of a point that measures along it."""
 
     own: Static
     axial: Static
@@ -87,8 +87,9 @@ def around(spindle: Spindle, chain: RotorBase, point: Point) -> Around:
 
 
 def free_motions(stiffness: Array) -> Array:
-    """Motions (n, m) that nothing resists, orthonormal. Degrees of freedom are scaled by their own stiffness (Jacobi's scaling, van der Sluis 1969, *Numer. Math.* 14, 14: within a factor n of
-    the best condition that a diagonal gives), so that neither units nor masses count: a light part on a stiff seat frees nothing else."""
+    """Motions (n, m) that nothing resists, orthonormal. Degrees of freedom are scaled by their own stiffness
+    (Jacobi's scaling, van der Sluis 1969, *Numer. Math.* 14, 14: within a factor n of the best condition that
+    a diagonal gives), so that neither units nor masses count: a light part on a stiff seat frees nothing else."""
     own = np.diag(stiffness)
     root = np.sqrt(np.where(own > 0, own, 1.0))
     scaled = stiffness / np.outer(root, root)
@@ -100,8 +101,9 @@ def free_motions(stiffness: Array) -> Array:
 
 
 def _regular(scaled: Array) -> bool:
-    """Whether a symmetric matrix is clearly positive: by its Cholesky factor, a tenth of the work of its eigenvalues, and an estimate of its condition in the sum norm, which is no less than that
-    of its eigenvalues (Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed. 2002, ch. 15)."""
+    """Whether a symmetric matrix is clearly positive: by its Cholesky factor, a tenth of the work of
+    its eigenvalues, and an estimate of its condition in the sum norm, which is no less than that of
+    its eigenvalues (Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed. 2002, ch. 15)."""
     factor, failed = scipy.linalg.lapack.dpotrf(scaled, lower=1)
     if failed:
         return False
@@ -129,8 +131,9 @@ def rated(spindle: Spindle) -> bool:
 
 
 def rated_chain(spindle: Spindle, chain: RotorBase) -> RotorBase:
-    """The chain with every bearing a spring of its rated radial stiffness from what turns to rigid ground, as catalogues and design
-    calculations have it: without tilt stiffness, coupling or housing. Bearings given by numbers keep theirs, to ground; those between two turning parts stay between them."""
+    """The chain with every bearing a spring of its rated radial stiffness from what turns to rigid
+    ground, as catalogues and design calculations have it: without tilt stiffness, coupling or housing.
+    Bearings given by numbers keep theirs, to ground; those between two turning parts stay between them."""
     ratings = {b.name: b for b in spindle.bearings}
     given = {b.name for b in spindle.linear_bearings} | {r.name for r in spindle.roller_bearings}
     turning = {b.name for b in chain.bodies if b.turns}

@@ -30,8 +30,9 @@ BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.FU
 
 
 class Numbers(Table):
-    """`radial`, `axial` and `tilt` stiffness alike in both planes; or `matrix_SI`, order x, y, z, tilt_x, tilt_y in N, m and rad; or the CSV
-    file `table` with columns temperature_C, speed_rpm and those of `COLUMNS`, `BY_DIRECTION` and `BETWEEN`, which is also what the verb `table` writes."""
+    """`radial`, `axial` and `tilt` stiffness alike in both planes; or `matrix_SI`, order x, y, z,
+    tilt_x, tilt_y in N, m and rad; or the CSV file `table` with columns temperature_C, speed_rpm and
+    those of `COLUMNS`, `BY_DIRECTION` and `BETWEEN`, which is also what the verb `table` writes."""
 
     radial_stiffness_N_per_um: Positive | None = None
     axial_stiffness_N_per_um: NotNegative = 0.0
@@ -63,7 +64,8 @@ class Numbers(Table):
         return self
 
     def grid(self, scene: Path, table_key: str) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-        """Temperatures (C), speeds (rad/s) and stiffness (temperatures, speeds, 5, 5), flat; `table_key` is the key of a table's file in the file of the `scene`."""
+        """Temperatures (C), speeds (rad/s) and stiffness (temperatures, speeds, 5, 5), flat;
+        `table_key` is the key of a table's file in the file of the `scene`."""
         if self.table is not None:
             return _read(named(scene, table_key, self.table, "CSV file", "scene"), self.bearing, f"{scene}: {table_key} = {self.table!r}")
         if self.matrix_SI is not None:

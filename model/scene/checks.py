@@ -117,7 +117,8 @@ def _check_materials(file: Path, spindle: Spindle, b: Bearing | RollerBearing, e
 
 
 def _check_rings(file: Path, spindle: Spindle, b: Bearing | RollerBearing, element: str) -> None:
-    """The rings of a bearing are regions about its height, each of the part that its body belongs to, with room for its balls or rollers between them."""
+    """The rings of a bearing are regions about its height, each of the part that its body belongs
+    to, with room for its balls or rollers between them."""
     where = f"{file}: bearings.{b.name}"
     for key, name in (("inner_ring", b.inner_ring), ("outer_ring", b.outer_ring)):
         if name not in {g.name for g in spindle.regions}:
@@ -257,7 +258,8 @@ def check_structure(file: Path, spindle: Spindle) -> None:
 
 
 def _check_names(file: Path, spindle: Spindle) -> None:
-    """Bodies and shafts have names that differ, and so have joints and bearings, from each other and from what MuJoCo's model is made of beside them."""
+    """Bodies and shafts have names that differ, and so have joints and bearings, from each other
+    and from what MuJoCo's model is made of beside them."""
     structure = spindle.structure
     taken = {"ground", "world", *(f"{b.name} carrier" for b in structure.bodies if b.turns), *(f"{b.name} sprung ring" for b in spindle.bearings)}
     for key, name in (*(("bodies", b.name) for b in structure.bodies), *(("shafts", s.name) for s in structure.shafts)):

@@ -61,7 +61,8 @@ class RowImperfections(Table):
     cage_phase_deg: Finite = 0.0
 
     def check(self, balls: int, rollers: bool = False) -> None:
-        """Raises ValueError for a list that does not hold one value for every ball, or roller of all rows, and for what rollers do not feel."""
+        """Raises ValueError for a list that does not hold one value for every ball, or roller of
+        all rows, and for what rollers do not feel."""
         if rollers and (self.inner_axial or self.outer_axial):
             raise ValueError(f"{'inner' if self.inner_axial else 'outer'}_axial: cylindrical rollers do not feel it; allowed are inner_radial and outer_radial")
         for key, values in (

@@ -58,7 +58,8 @@ def assumed_points(body: str, ends: tuple[float, float], moves: Sequence[str]) -
 
 
 class HammerTest(Table):
-    """Every key has an assumed default: a miniature hammer on the first point, a light tap (0.14 ms, more than a sample), a quiet laser vibrometer up to 3 kHz.
+    """Every key has an assumed default: a miniature hammer on the first point, a light tap (0.14
+    ms, more than a sample), a quiet laser vibrometer up to 3 kHz.
 
     Without `step_us` the program chooses the integration step (`reading.chosen_step`).
     """

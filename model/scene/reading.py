@@ -113,7 +113,8 @@ def shipped_rows() -> dict[str, dict[str, Any]]:
 
 
 def formed(raw: Mapping[str, Any], file: Path) -> tuple[dict[str, Any], scene_file.Scene]:
-    """Parsed TOML in today's format, with the shipped rows that it names, and as the form of a scene; `BadInput` where it does not fit that."""
+    """Parsed TOML in today's format, with the shipped rows that it names, and as the form of a
+    scene; `BadInput` where it does not fit that."""
     whole = with_shipped_rows(migrated(SCENE, dict(raw), file))
     _check_rows(whole, file)
     try:
@@ -148,12 +149,13 @@ def with_shipped_rows(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 
 SAFE, SAFE_SHAFT = 1.35, 2.2
-"""|pole| step of the stiffest mode at the reference, where Runge-Kutta 4 bears 2.78: half of it, for bearings stiffer than at the reference; more
-where the stiffest mode is one of a shaft's short elements, which no condition stiffens."""
+"""|pole| step of the stiffest mode at the reference, where Runge-Kutta 4 bears 2.78: half of it, for bearings stiffer
+than at the reference; more where the stiffest mode is one of a shaft's short elements, which no condition stiffens."""
 
 
 def chosen_step(spindle: Spindle) -> float:
-    """The longest integration step (s) that divides the sampling interval and follows the stiffest mode at the reference state, or as near it as tables of bearing numbers reach."""
+    """The longest integration step (s) that divides the sampling interval and follows the stiffest
+    mode at the reference state, or as near it as tables of bearing numbers reach."""
     still = {b.name: reference_motion(spindle.reference_temperature) for b in spindle.bearings}
     temperature, speed = spindle.reference_temperature, 0.0
     for b in spindle.linear_bearings:

@@ -56,7 +56,8 @@ class Section(Table):
 
 @dataclass(frozen=True)
 class Slab:
-    """A shaft between two heights where nothing of its section changes, in mm: `mass_outer` is the diameter that would carry the mass of all."""
+    """A shaft between two heights where nothing of its section changes, in mm: `mass_outer` is the
+    diameter that would carry the mass of all."""
 
     z: tuple[float, float]
     outer: float
@@ -70,10 +71,11 @@ class Slab:
 
 
 def slabs(section: Section, densities: dict[str, float], names: Sequence[str], carried: Sequence[str], turns: bool) -> list[Slab]:
-    """The shaft that the regions `names` are, lowest slab first, with the mass of the regions `carried` on it, which do not stiffen it; all of them turn, or stand.
+    """The shaft that the regions `names` are, lowest slab first, with the mass of the regions
+    `carried` on it, which do not stiffen it; all of them turn, or stand.
 
-    Densities (kg/m3) are by material. In every slab the regions that bend must be one tube of one material. What is carried counts with its mass; its
-    rotary inertia is taken as that of a tube of the shaft's material directly around it.
+    Densities (kg/m3) are by material. In every slab the regions that bend must be one tube of one material. What is
+    carried counts with its mass; its rotary inertia is taken as that of a tube of the shaft's material directly around it.
     """
     known = {r.name: r for r in section.regions}
     for key, told in (("regions", names), ("mass_regions", carried)):

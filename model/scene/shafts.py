@@ -40,7 +40,8 @@ COARSE = 0.05
 DRAWN = ("material", "materials", "start_z_mm", "outer_mm", "bore_mm", "mass_outer_mm", "width_mm", "height_mm")
 """What draws a shaft, where regions of the section do not."""
 FINEST = 500
-"""Elements over a shaft's length that a scene may ask for: matrices are dense, and a frequency is exact to all digits that are printed long before."""
+"""Elements over a shaft's length that a scene may ask for: matrices are dense, and a frequency is
+exact to all digits that are printed long before."""
 
 
 class ShaftForm(Table):

@@ -1,7 +1,8 @@
 """The picture of a scene: the half section with bearings and their load lines above the axis, what moves as a chain below it.
 
-The axis lies across the picture, z to the right. Above: regions of the section (or the shafts' outlines where there is none), turning
-bodies that are in neither as cylinders of their mass and inertia, balls and load lines, springs of bearings given by numbers, measuring points. Below: beams with their nodes, centres of mass of rigid bodies, joints.
+The axis lies across the picture, z to the right. Above: regions of the section (or the shafts' outlines where there
+is none), turning bodies that are in neither as cylinders of their mass and inertia, balls and load lines, springs of
+bearings given by numbers, measuring points. Below: beams with their nodes, centres of mass of rigid bodies, joints.
 """
 
 from __future__ import annotations
@@ -112,7 +113,8 @@ def _frame(spindle: Spindle) -> Frame:
 
 
 def _bodies(axes: Axes, spindle: Spindle, frame: Frame) -> None:
-    """The regions of the section, the outlines of shafts that are not in it, and turning bodies that are in neither as the solid cylinders of their mass and inertia."""
+    """The regions of the section, the outlines of shafts that are not in it, and turning bodies
+    that are in neither as the solid cylinders of their mass and inertia."""
     for b in _undrawn(spindle):
         (radius, length), least = cylinder(b), LEAST * frame.per_inch
         wide, high = max(length / MM, least), max(radius / MM, least)
@@ -127,12 +129,14 @@ def _bodies(axes: Axes, spindle: Spindle, frame: Frame) -> None:
 
 
 def _undrawn(spindle: Spindle) -> list[Body]:
-    """Turning rigid bodies, as a chuck or a motor's rotor, that neither section nor shafts show. What stands has its housing there, and seldom a polar inertia that is its own."""
+    """Turning rigid bodies, as a chuck or a motor's rotor, that neither section nor shafts show.
+    What stands has its housing there, and seldom a polar inertia that is its own."""
     return [b for b in spindle.structure.rigid_bodies if b.turns and b.mass > 0 and not b.regions]
 
 
 def cylinder(b: Body) -> tuple[float, float]:
-    """Radius and length (m) of the solid cylinder of a body's mass and inertia: I_z = m r^2 / 2, I_x = m (3 r^2 + l^2) / 12; 0 for what it has no inertia for."""
+    """Radius and length (m) of the solid cylinder of a body's mass and inertia: I_z = m r^2 / 2,
+    I_x = m (3 r^2 + l^2) / 12; 0 for what it has no inertia for."""
     radius = np.sqrt(2 * b.inertia[2] / b.mass)
     return float(radius), float(np.sqrt(max(12 * min(b.inertia[:2]) / b.mass - 3 * radius**2, 0.0)))
 
@@ -274,7 +278,8 @@ def _half(text: str, frame: Frame) -> float:
 
 
 def _leader(start: tuple[float, float], end: tuple[float, float], words: Sequence[tuple[float, float, float]], half: float) -> tuple[list[float], list[float]]:
-    """The line from what a label names to the label, with gaps where it would run through `words` (place, height, half width), `half` their half height."""
+    """The line from what a label names to the label, with gaps where it would run through `words`
+    (place, height, half width), `half` their half height."""
     (z, r), (place, at) = start, end
     gaps = []
     for middle, height, wide in words:

@@ -91,7 +91,8 @@ def _materials(found: Looked) -> Iterator[str]:
 
 
 def _compact(found: Looked) -> Iterator[str]:
-    """Bodies given by numbers whose mass would have to be denser than any solid: of all shapes a ball has the least largest moment of inertia."""
+    """Bodies given by numbers whose mass would have to be denser than any solid: of all shapes a
+    ball has the least largest moment of inertia."""
     structure = found.spindle.structure
     for b in structure.bodies:
         largest = max(b.inertia)
@@ -128,7 +129,8 @@ def _slow(found: Looked) -> Iterator[str]:
 
 
 def _massless(found: Looked) -> Iterator[str]:
-    """Regions of the section whose mass nothing has, in a part of which everything else is made of regions: a body or shaft given by numbers, or a ground that holds rings, may stand for them."""
+    """Regions of the section whose mass nothing has, in a part of which everything else is made of
+    regions: a body or shaft given by numbers, or a ground that holds rings, may stand for them."""
     spindle, structure = found.spindle, found.spindle.structure
     grounded = any("ground" in (b.inner_body, b.outer_body) for b in spindle.all_bearings)
     for part in PARTS:
@@ -201,7 +203,8 @@ def _points(found: Looked) -> Iterator[str]:
 
 
 def off(spindle: Spindle, p: Point) -> float:
-    """Distance (m) of a point from its body; 0 on the axis, where sensors of plain models are, and where nothing is known of the body's shape."""
+    """Distance (m) of a point from its body; 0 on the axis, where sensors of plain models are, and
+    where nothing is known of the body's shape."""
     r, z = float(np.hypot(*p.position[:2])), p.position[2]
     shaft = next((s for s in spindle.structure.shafts if p.body in s.bodies), None)
     if r == 0.0:

@@ -28,16 +28,20 @@ STIFFER = 1.3
 CONTACT_ANGLE = (5.0, 60.0)
 """Degrees: deep-groove bearings have 8 to 15 of their clearance, angular contact ones 12 to 40, thrust ones 60."""
 TIGHTEST, LOOSEST = -1.2e-4, 1e-3
-"""Of the pitch diameter, between which mounted clearances lie: N and NN rows of machine tools are set to between -5 and 5 um at 100 to 150 mm, and C3 of such a size is 90 um."""
+"""Of the pitch diameter, between which mounted clearances lie: N and NN rows of machine tools are
+set to between -5 and 5 um at 100 to 150 mm, and C3 of such a size is 90 um."""
 OFF_MIDDLE = 0.4
-"""Ball diameters by which the pitch diameter may differ from the middle of the raceways: those are drawn as shoulders, or to the groove's bottom."""
+"""Ball diameters by which the pitch diameter may differ from the middle of the raceways: those are
+drawn as shoulders, or to the groove's bottom."""
 SOFTEST = 1e3
 """N/m: a tenth of a millimetre changes the force of a softer spring by 0.1 N at most."""
 SAG = 1.0 * MM
-"""By which the weight of what turns would sink on one bearing alone: more than any gap between what turns and what stands, and seals and motors would rub."""
+"""By which the weight of what turns would sink on one bearing alone: more than any gap between what
+turns and what stands, and seals and motors would rub."""
 GRAVITY = 9.81
 HEAVY = 0.5e6
-"""mm rev/min, speed times pitch diameter, from which balls are commonly taken with their inertia: what grease allows (Harris, Rolling Bearing Analysis, ch. 8, on high speed)."""
+"""mm rev/min, speed times pitch diameter, from which balls are commonly taken with their inertia:
+what grease allows (Harris, Rolling Bearing Analysis, ch. 8, on high speed)."""
 
 
 def _loose(found: Looked) -> Iterator[str]:
@@ -113,7 +117,8 @@ def _angles(found: Looked) -> Iterator[str]:
 
 
 def _catalogues(found: Looked) -> Iterator[str]:
-    """Balls that a catalogue's preload, unloading force and axial rigidity do not fit; once a row of the scene's, whatever bearings have it."""
+    """Balls that a catalogue's preload, unloading force and axial rigidity do not fit; once a row
+    of the scene's, whatever bearings have it."""
     of: dict[str, list[Bearing]] = {}
     for b in found.spindle.bearings:
         if b.constant_factor != 1.0:

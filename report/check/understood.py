@@ -25,7 +25,8 @@ NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 
 
 def understood(drawn: Spindle, point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, Any]:
-    """The keys of `spindle check --json` but `odd` and `warnings` for a spindle as `drawn`; `point` is it at its reference temperature, at rest, whose bodies carry what sits on points."""
+    """The keys of `spindle check --json` but `odd` and `warnings` for a spindle as `drawn`; `point`
+    is it at its reference temperature, at rest, whose bodies carry what sits on points."""
     spindle = point.spindle
     structure, own = spindle.structure, spindle.imperfections
     plain = structure.rigid_bodies

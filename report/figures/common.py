@@ -162,7 +162,8 @@ SAME = 1e-4
 
 
 def least_span(axes: Axes, values: Array, least: float | None = None) -> None:
-    """The upright axis shows `least` (by default `SAME` of the largest) on either side of what is drawn, where all `values` are nearer to each other than that: else its rounding would fill the panel."""
+    """The upright axis shows `least` (by default `SAME` of the largest) on either side of what is drawn,
+    where all `values` are nearer to each other than that: else its rounding would fill the panel."""
     known = values[np.isfinite(values)]
     if not known.size:
         return
@@ -173,8 +174,8 @@ def least_span(axes: Axes, values: Array, least: float | None = None) -> None:
 
 
 def spread(wanted: Array, apart: float, low: float = 0.0, high: float = 1.0) -> Array:
-    """Places (n,) nearest to the `wanted` ones (any order), in least squares, that keep their order, are `apart` and lie between `low` and `high`; closer
-    together where so many do not fit."""
+    """Places (n,) nearest to the `wanted` ones (any order), in least squares, that keep their
+    order, are `apart` and lie between `low` and `high`; closer together where so many do not fit."""
     if not len(wanted):
         return wanted
     order = np.argsort(wanted, kind="stable")

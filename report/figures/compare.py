@@ -1,4 +1,5 @@
-"""Pictures of a comparison: map of residuals, shapes, FRFs over each other, FDAC, correlation by band and by FRF. Every function returns a figure."""
+"""Pictures of a comparison: map of residuals, shapes, FRFs over each other, FDAC, correlation by
+band and by FRF. Every function returns a figure."""
 
 from __future__ import annotations
 
@@ -94,7 +95,8 @@ def _grid(c: Comparison, modes: Sequence[int], value: Callable[[PairedMode], flo
 
 @rc_context(STYLE)
 def shapes(c: Comparison) -> Figure:
-    """Measured and computed shapes of the first test that tells any: over height where its points stand along the axis in one direction, else point by point."""
+    """Measured and computed shapes of the first test that tells any: over height where its points
+    stand along the axis in one direction, else point by point."""
     test = next(t for t in c.tests if t.shapes)
     told = sorted(test.shapes, key=lambda own: own.number)
     columns = min(len(told), ACROSS)
@@ -166,7 +168,8 @@ def overlay(c: Comparison) -> Figure:
 
 
 def _number_modes(axes: Axes, modes: Sequence[PairedMode], band: tuple[float, float]) -> None:
-    """A tick at the top of an FRF at every paired mode's measured frequency, with its number; neighbours without room for two numbers share a place."""
+    """A tick at the top of an FRF at every paired mode's measured frequency, with its number;
+    neighbours without room for two numbers share a place."""
     groups: list[list[PairedMode]] = []
     for m in sorted((m for m in modes if band[0] <= m.measured <= band[1]), key=lambda m: m.measured):
         axes.plot(m.measured, 0.985, marker="|", ms=6, color=PALE, transform=axes.get_xaxis_transform(), clip_on=False)

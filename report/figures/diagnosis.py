@@ -57,8 +57,8 @@ def explanations(d: Diagnosis) -> Figure:
 
 @rc_context(STYLE)
 def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str], ended: Sequence[bool] | None = None) -> Figure:
-    """Bars of ln evidence `value` (n,) in the colours `paint`, with their numbers. The axis is that of fits that have `ended` where they arrive, others are hatched;
-    a bar that goes on beyond the axis ends in an arrow."""
+    """Bars of ln evidence `value` (n,) in the colours `paint`, with their numbers. The axis is that of fits that
+    have `ended` where they arrive, others are hatched; a bar that goes on beyond the axis ends in an arrow."""
     ended = [True] * len(names) if ended is None else ended
     figure = Figure(figsize=(8.6, 0.85 + (0.13 + 0.14 * max(n.count("\n") + 1 for n in names)) * len(names)), layout="constrained")
     axes = figure.add_subplot()
@@ -147,8 +147,8 @@ def _over_temperature(axes: Axes, conditions: Sequence[Condition], value: Array,
 
 @rc_context(STYLE)
 def errors(d: Diagnosis) -> Figure:
-    """Rms residual of every test, as drawn, with tolerances fitted and with what the verdict names: fitted to all tests, and predicted from all other conditions
-    where there are any."""
+    """Rms residual of every test, as drawn, with tolerances fitted and with what the verdict names:
+    fitted to all tests, and predicted from all other conditions where there are any."""
     model, base, accepted = d.search.model, d.search.base, d.verdict.accepted
     shown: list[tuple[str, Hypothesis, str, str]] = [("tolerances and constant errors fitted", base, "s", OTHER)]
     if accepted is not base:

@@ -59,7 +59,8 @@ FEW, COLUMNS = 2, 3  # bearings named among the curves; names side by side above
 
 @rc_context(STYLE)
 def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[str, Sequence[float]]], label: str, from_zero: bool) -> str:
-    """One quantity of every bearing over temperature, or several beside their names, the second with open marks: values by name and by bearing."""
+    """One quantity of every bearing over temperature, or several beside their names, the second
+    with open marks: values by name and by bearing."""
     figure = Figure(figsize=(3.55, 2.45))
     axes = figure.add_subplot()
     for k, (name, values) in enumerate(curves.items()):
@@ -136,7 +137,8 @@ def comparison(key: str, modes: Mapping[int, str], sources: Sequence[Peaks], col
 
 @rc_context(STYLE)
 def responses(key: str, panels: Mapping[str, Sequence[Curve]], peaks: Sequence[Peaks], band: tuple[float, float]) -> str:
-    """FRFs, with their coherence below where there is one, a panel a driving point, under a strip of the natural frequencies of every source."""
+    """FRFs, with their coherence below where there is one, a panel a driving point, under a strip
+    of the natural frequencies of every source."""
     every = sorted({curve.temperature for curves in panels.values() for curve in curves})
     own = ("computed", "identified")
     labels = list(dict.fromkeys(p.label for p in sorted(peaks, key=lambda p: p.source not in own)))
@@ -190,7 +192,8 @@ def _strip(axes: Axes, peaks: Sequence[Peaks], labels: Sequence[str], every: Seq
 
 
 def grouped(peaks: Peaks, apart: float) -> list[tuple[str, float]]:
-    """Mode numbers as labels at their frequencies; numbers share a label where two would stand less than `apart` (Hz), a digit's width and a half, from each other."""
+    """Mode numbers as labels at their frequencies; numbers share a label where two would stand less
+    than `apart` (Hz), a digit's width and a half, from each other."""
     found: list[tuple[str, list[float]]] = []
     for mode, (f, _) in sorted(peaks.value.items(), key=lambda item: item[1][0]):
         name, at = str(mode), [f]

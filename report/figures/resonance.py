@@ -39,13 +39,15 @@ DASHES = ("-", "--", ":")  # of modes that share a colour
 
 @rc_context(STYLE)
 def figures(found: ResonanceMap) -> dict[str, Figure]:
-    """By the names of their files; `nrro` only where something does not repeat, and what goes over temperature only where the map has several."""
+    """By the names of their files; `nrro` only where something does not repeat, and what goes over
+    temperature only where the map has several."""
     several = {"temperature": over_temperature(found), "coincidences": both(found)} if len(found.temperatures) > 1 else {}
     return {"campbell": campbell(found)} | several | ({} if found.repeats else {"nrro": runout(found)})
 
 
 def drawn_lines(found: ResonanceMap) -> list[LineTrack]:
-    """The unbalance, the lines that meet modes at the nominal speed and the one nearest to a mode there, and those of the strongest coincidences up to `LINES`; one bearing for each."""
+    """The unbalance, the lines that meet modes at the nominal speed and the one nearest to a mode
+    there, and those of the strongest coincidences up to `LINES`; one bearing for each."""
     tracks = {key(t.line): t for t in found.lines}
     chosen: dict[tuple, LineTrack] = {}
     near = nearest(found.coincidences)
@@ -106,8 +108,8 @@ def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, floa
 
 
 def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = False) -> Figure:
-    """Natural frequencies and the strongest lines among them over temperature, at the nominal speed; `bare` without title and key. Where there are more names than room, those of what meets
-    there come first."""
+    """Natural frequencies and the strongest lines among them over temperature, at the nominal speed; `bare`
+    without title and key. Where there are more names than room, those of what meets there come first."""
     figure = Figure(figsize=size)
     axes = figure.subplots()
     _, s0 = found.nominal_index
@@ -135,7 +137,8 @@ def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, bare
 
 
 def _among(found: ResonanceMap, crossing: Sequence[Coincidence], low: float, high: float) -> list[LineTrack]:
-    """At most `LINES` lines to draw over temperature: those that meet a mode at the nominal speed, then the largest between `low` and `high` (Hz), one bearing for each."""
+    """At most `LINES` lines to draw over temperature: those that meet a mode at the nominal speed,
+    then the largest between `low` and `high` (Hz), one bearing for each."""
     tracks, (_, s0) = {key(t.line): t for t in found.lines}, found.nominal_index
     chosen = {key(c.line): tracks[key(c.line)] for c in crossing}
     kinds = {_kind(t.line) for t in chosen.values()}
@@ -147,7 +150,8 @@ def _among(found: ResonanceMap, crossing: Sequence[Coincidence], low: float, hig
 
 
 def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = False) -> Figure:
-    """Where the strongest lines meet a mode, as curves over speed and temperature, over the speeds where they do; `bare` without title and key."""
+    """Where the strongest lines meet a mode, as curves over speed and temperature, over the speeds
+    where they do; `bare` without title and key."""
     figure = Figure(figsize=size)
     axes = figure.subplots()
     axes.set_ylim(found.temperatures[0], found.temperatures[-1])
@@ -186,7 +190,8 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = Fal
 
 
 def runout(found: ResonanceMap) -> Figure:
-    """Nonrepeatable runout of the linear response along temperature and along speed, with the strongest coincidences passed on the way and the one nearest to the nominal condition; not at rest, where there is none, for it does not grow from 0."""
+    """Nonrepeatable runout of the linear response along temperature and along speed, with the strongest coincidences passed
+    on the way and the one nearest to the nominal condition; not at rest, where there is none, for it does not grow from 0."""
     t_nominal, n_nominal = found.nominal.temperature, found.nominal.speed / RPM
     at_speed = [c for c in found.coincidences if c.at_nominal_speed]
     at_temperature = [c for c in found.coincidences if abs(c.condition.temperature - t_nominal) < ALIKE]
@@ -229,7 +234,8 @@ def _pair(c: Coincidence) -> tuple[tuple[str, int, str, int], int]:
 
 
 def _around(speeds: Sequence[float], every: np.ndarray) -> tuple[float, float]:
-    """Ends (rpm) of an axis that holds some `speeds` (rad/s), with a margin within `every` one of the map; of the whole map where these are one."""
+    """Ends (rpm) of an axis that holds some `speeds` (rad/s), with a margin within `every` one of
+    the map; of the whole map where these are one."""
     low, high = (min(speeds), max(speeds)) if min(speeds) < max(speeds) else (every[0], every[-1])
     margin = 0.06 * (high - low)
     return max(low - margin, every[0]) / RPM, min(high + margin, every[-1]) / RPM

@@ -20,7 +20,8 @@ SMALL = {**STYLE, "font.size": 7.5, "axes.titlesize": 7.5, "axes.titleweight": "
 
 
 def panels(titled: Mapping[str, Curves], columns: int, size: tuple[float, float], unit: str, named: Mapping[str, Colour] | None = None) -> Figure:
-    """Small charts of curves (x, y, colour) in rows of `columns`; `unit` of x below the lowest of them, above them what colours are `named`."""
+    """Small charts of curves (x, y, colour) in rows of `columns`; `unit` of x below the lowest of
+    them, above them what colours are `named`."""
     with rc_context(SMALL):
         figure = Figure(figsize=size)
         rows = -(-len(titled) // columns)

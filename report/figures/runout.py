@@ -161,15 +161,16 @@ def spectrum_figure(runout: Runout) -> Figure:
 
 
 def _large(every: Sequence[FoundLine]) -> list[FoundLine]:
-    """Lines that a spectrum must hold: of each direction those above a hundredth of its strongest, unless that is nothing beside the strongest of all."""
+    """Lines that a spectrum must hold: of each direction those above a hundredth of its strongest,
+    unless that is nothing beside the strongest of all."""
     most = max((g.amplitude for g in every), default=0.0)
     own = {d: max((g.amplitude for g in every if g.direction == d), default=0.0) for d in NAMED}
     return [g for g in every if g.amplitude > 1e-2 * own[g.direction] and own[g.direction] > NOTHING * most]
 
 
 def waterfall_figure(spectra: Sequence[LineSpectrum], direction: str, size: tuple[float, float]) -> Figure:
-    """Spectra over frequency, one above the other in rpm, each rising by its level above `RANGE` dB below the strongest line of all, which the title tells;
-    dots are natural frequencies."""
+    """Spectra over frequency, one above the other in rpm, each rising by its level above `RANGE` dB
+    below the strongest line of all, which the title tells; dots are natural frequencies."""
     highest = 500 * np.ceil(max(float(s.frequency.max(initial=1.0)) for s in spectra) / 500)
     grid = np.linspace(0, highest, 1201)
     amplitude = np.array([on_grid(s, grid, direction) for s in spectra])
@@ -204,7 +205,8 @@ def _marks(axes: Axes, own: Sequence[FoundLine]) -> None:
 
 
 def line_label(line: FoundLine, bearings: Sequence[str], every: int) -> str:
-    """What a line is called in a figure: its name in the field's words and what causes it, and below in which of a spindle's bearings, of which there are `every` many."""
+    """What a line is called in a figure: its name in the field's words and what causes it, and
+    below in which of a spindle's bearings, of which there are `every` many."""
     if not line.causes:
         return f"{line.order:.4g}x\nunexplained"
     named = [b for b in bearings if b]
@@ -213,7 +215,8 @@ def line_label(line: FoundLine, bearings: Sequence[str], every: int) -> str:
 
 
 def _named(own: Sequence[FoundLine], most: int, near: float, every: int) -> list[tuple[FoundLine, str]]:
-    """The `most` strongest lines, and the strongest repeatable one, with their labels; lines of one kind in several of `every` bearings less than `near` (Hz) apart share one."""
+    """The `most` strongest lines, and the strongest repeatable one, with their labels; lines of one
+    kind in several of `every` bearings less than `near` (Hz) apart share one."""
     found: list[tuple[FoundLine, list[str]]] = []
     for line in sorted(own, key=lambda g: g is not next((h for h in own if h.repeatable), None)):
         first = line.causes[0] if line.causes else None
@@ -230,7 +233,8 @@ def _named(own: Sequence[FoundLine], most: int, near: float, every: int) -> list
 
 
 def _labels(axes: Axes, named: Sequence[tuple[FoundLine, str]], highest: float, top: float) -> None:
-    """Upright labels above the lines, side by side, with leaders that stand over their lines and bend above all of them: none crosses another."""
+    """Upright labels above the lines, side by side, with leaders that stand over their lines and
+    bend above all of them: none crosses another."""
     rising = sorted(named, key=lambda g: g[0].frequency)
     rows = max((label.count("\n") + 1 for _, label in rising), default=1)
     places = spread(np.array([line.frequency for line, _ in rising]), (0.012 + 0.011 * rows) * highest, 0.006 * rows * highest, (1 - 0.006 * rows) * highest)

@@ -106,8 +106,9 @@ def headed(drawn: Mapping[str, Figure], title: str, scenes: Sequence[str]) -> Ma
 def looks_of(others: Sequence[str], lines: Sequence[tuple[Any, ...]]) -> tuple[dict[tuple[Any, ...], Look], list[Line2D]]:
     """How each line is drawn, whose values of `others` are its key, and the key of the figure: one entry for each value.
 
-    A quantity has a look of its own: temperature the colours from cold to hot, of the others the first that are free of dashes, marks, and, where temperature is none of them,
-    the colours of things. What is left shares the last. Lines that cover each other are told apart: wide dashes beneath thin ones, large open marks about small ones.
+    A quantity has a look of its own: temperature the colours from cold to hot, of the others the first that are free
+    of dashes, marks, and, where temperature is none of them, the colours of things. What is left shares the last.
+    Lines that cover each other are told apart: wide dashes beneath thin ones, large open marks about small ones.
     """
     free = ["dashes", "marks"] if "temperature_C" in others else ["dashes", "marks", "colours"]
     names = sorted((c for c in others if c != "temperature_C"), key=lambda c: c != "speed_rpm")  # speed dashed, wherever it varies

@@ -122,7 +122,8 @@ def _group_name(names: Sequence[str], parts: Mapping[str, str]) -> str:
 
 
 def name_ends(axes: Axes, ends: Array, names: Sequence[str], colours: Sequence[str]) -> None:
-    """Names beside the right ends of lines, moved apart where they would overlap, the first of them where there is no room for all; a thin line leads to a name that moved."""
+    """Names beside the right ends of lines, moved apart where they would overlap, the first of them
+    where there is no room for all; a thin line leads to a name that moved."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high)
     figure = axes.figure

@@ -78,7 +78,8 @@ def _section_view(shown: Shown, which: str, name: str) -> rrb.View:
 
 
 def framed(spindle: Spindle) -> tuple[bool, float, float]:
-    """Whether a spindle is longer than wide; what a view must reach, its radius or half its length, and the height of what it looks at, in mm."""
+    """Whether a spindle is longer than wide; what a view must reach, its radius or half its length,
+    and the height of what it looks at, in mm."""
     radius, low, high = extent(spindle)
     whole = size(spindle)
     return whole > radius, TO_MM * whole, TO_MM * (low + high) / 2 if whole > radius else 0.0

@@ -37,7 +37,8 @@ UNITS = {
     },
     "warmup": {"/series/regions": "C", "/series/bearings/temperature": "C", "/series/bearings/preload": "N", "/series/bearings/contact angle": "deg", "/series/modes": "Hz of change since the start"},
 }  # fmt: skip
-"""By kind of log the units of numbers whose names have none, by entity, or entity and component; of an FRF it is that of its `quantity`. Every log holds its own, at `numbers/units`."""
+"""By kind of log the units of numbers whose names have none, by entity, or entity and component; of
+an FRF it is that of its `quantity`. Every log holds its own, at `numbers/units`."""
 
 
 @contextmanager

@@ -1,7 +1,8 @@
 """The Rerun log of an impact test: every hit in time, the FRFs with their coherence, and the modal peaks.
 
-`records/<hammer>/<hit>/` holds `force` (N) and `velocity` (m/s, as many values a sample as there are responses) on the timeline `time`, every
-sample as the analyser took it. FRFs, peaks and mode shapes stand as in the log of a run, on `frequency`; `report.log.read` reads all of it back.
+`records/<hammer>/<hit>/` holds `force` (N) and `velocity` (m/s, as many values a sample as there
+are responses) on the timeline `time`, every sample as the analyser took it. FRFs, peaks and mode
+shapes stand as in the log of a run, on `frequency`; `report.log.read` reads all of it back.
 """
 
 from __future__ import annotations

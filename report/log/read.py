@@ -1,7 +1,7 @@
 """Reads any of our Rerun logs back: what is in it as numbers, bit for bit as computed.
 
-A log says by its property which kind it is: `run` (also impact test, comparison and ladder), `map`, `runout`, `warmup` or `study`. Numbers stand
-under `numbers/` as components with plain names; `Log.table` gives those of one entity, and `report.log.told` says what they mean.
+A log says by its property which kind it is: `run` (also impact test, comparison and ladder), `map`, `runout`, `warmup` or `study`. Numbers
+stand under `numbers/` as components with plain names; `Log.table` gives those of one entity, and `report.log.told` says what they mean.
 """
 
 from __future__ import annotations

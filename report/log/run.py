@@ -140,7 +140,8 @@ def log_key(recording: rr.RecordingStream, content: Shown) -> None:
 
 
 def log_motion(recording: rr.RecordingStream, content: Shown) -> None:
-    """Mode shapes, and the answer to a swept force, at the first temperature, what turns amber; on two timelines at once, at rest on the others."""
+    """Mode shapes, and the answer to a swept force, at the first temperature, what turns amber; on
+    two timelines at once, at rest on the others."""
     point = content.run.steps[0].point
     frequency = np.arange(content.band[0], content.band[1] + 1, content.step)
     motions = {f"mode_{i}": posing.mode_motion(point, m, len(frequency)) for i, m in enumerate(content.modes, 1)}

@@ -49,7 +49,8 @@ WORDS = {
 
 
 def sections(c: Comparison, both: BeforeAfter | None = None) -> list[Section]:
-    """What the comparison adds to a report: the map of residuals and errors in a table, of `both` scenes those before and after, then what its FRFs say, where it has any."""
+    """What the comparison adds to a report: the map of residuals and errors in a table, of `both`
+    scenes those before and after, then what its FRFs say, where it has any."""
     found: list[Section] = []
     drawn = {name: svg(one, f"compare-{name}", WORDS[name][0]) for name, one in figures(c).items()}
     modal = "".join(figure(drawn[name], WORDS[name][1]) for name in ("pulls", "shapes") if name in drawn)
@@ -74,7 +75,8 @@ def write_comparison(
 ) -> None:
     """`report.html`, a PNG and an SVG of every picture, and, where there are FRFs, `compare.rrd`, in a folder that exists.
 
-    `c` are tests of modes, `turning` tests of runout with the `errors` of two scenes; either may be missing. `both` is `c` beside the scene before it. `campaign` is its title, where there is no `c`, and `name` what its folder is called.
+    `c` are tests of modes, `turning` tests of runout with the `errors` of two scenes; either may be missing. `both` is
+    `c` beside the scene before it. `campaign` is its title, where there is no `c`, and `name` what its folder is called.
     """
     drawn = comparison_figures(turning)
     every = [*(sections(c, both) if c else []), *(runout.sections(turning, drawn, errors) if turning else [])]

@@ -70,7 +70,8 @@ class Table:
 def compared(run: Run) -> Table:
     """Measured, published, computed and identified frequencies side by side.
 
-    The temperatures are the outermost of the run at which something was measured or published; with one such, that and the hottest; without, the run's own.
+    The temperatures are the outermost of the run at which something was measured or published; with
+    one such, that and the hottest; without, the run's own.
     """
     numbers, own = numbered(run), [temperature_of(s) for s in run.steps]
     papers = () if run.steps[0].point.condition.speed else published(run.spindle)

@@ -52,7 +52,8 @@ def sections(d: Diagnosis, answer: dict[str, Any], drawn: dict[str, Figure] | No
 def write_diagnosis(
     d: Diagnosis | None, answer: dict[str, Any], spindle: Spindle, folder: Path, turning: RunoutDiagnosis | None = None, told: dict[str, Any] | None = None, *, name: str = ""
 ) -> None:
-    """`report.html`, and every picture as SVG and PNG, into a folder that exists; `turning` is the diagnosis of runout, `told` its answer; `name` is that of the campaign's folder."""
+    """`report.html`, and every picture as SVG and PNG, into a folder that exists; `turning` is the
+    diagnosis of runout, `told` its answer; `name` is that of the campaign's folder."""
     modal = figures(d) if d else {}
     runout = diagnosis_figures(turning, spindle) if turning else {}
     every = sections(d, answer, modal) if d else []

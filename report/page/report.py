@@ -57,7 +57,8 @@ def write_report(run: Run, path: Path, extra_sections: Sequence[Section] = ()) -
 
 
 def drawn(page: str) -> dict[str, str]:
-    """The pictures of a page as SVG files of their own, on white, by their descriptions in small letters with dashes; of several with one description the later ones are numbered."""
+    """The pictures of a page as SVG files of their own, on white, by their descriptions in small
+    letters with dashes; of several with one description the later ones are numbered."""
     found: dict[str, str] = {}
     for picture in re.finditer(r'<svg viewBox="(\S+) (\S+) (\S+) (\S+)"[^>]*aria-label="([^"]*)"[^>]*>(.*?)</svg>', page, re.DOTALL):
         left, top, width, height, description, inside = picture.groups()
@@ -76,7 +77,8 @@ def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
 
 
 def page(spindle: Spindle, conditions: str, sections: Sequence[Section], kind: str = "", of: str = "") -> str:
-    """A page of the report's look with any sections, at `conditions` in words; `kind` (Run, Comparison, ...) begins its title, and what it is `of` follows."""
+    """A page of the report's look with any sections, at `conditions` in words; `kind` (Run,
+    Comparison, ...) begins its title, and what it is `of` follows."""
     return str(_page().page(spindle, conditions, [(title, Markup(named(body, title))) for title, body in sections], kind, of, Markup(MADE)))
 
 
@@ -85,7 +87,8 @@ SCROLLED = re.compile(r'<(figure class="chart wide"|div class="scroll")>(?=(?:<s
 
 
 def named(body: str, title: str) -> str:
-    """The HTML of a section in which all that scrolls, at which the Tab key stops, has a name: of its picture or table, or else the section's title."""
+    """The HTML of a section in which all that scrolls, at which the Tab key stops, has a name: of
+    its picture or table, or else the section's title."""
 
     def name(found: re.Match[str]) -> str:
         plain = Markup(found[3] or found[2] or escape(title)).striptags()
@@ -96,7 +99,8 @@ def named(body: str, title: str) -> str:
 
 
 def write_page(folder: Path, spindle: Spindle, tests: int, campaign: str, sections: Sequence[Section], kind: str, name: str = "") -> None:
-    """`report.html` on so many tests of a `campaign`, by its title; its `name` and the scene's are in the page's own title, for pages of one spindle side by side."""
+    """`report.html` on so many tests of a `campaign`, by its title; its `name` and the scene's are
+    in the page's own title, for pages of one spindle side by side."""
     conditions = f"the conditions of {tests} test{'s' if tests > 1 else ''}: {campaign}"
     (folder / "report.html").write_text(page(spindle, conditions, sections, kind, f"{name or campaign} beside {spindle.name}"), encoding="utf-8")
 

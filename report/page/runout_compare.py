@@ -25,7 +25,8 @@ CAPTIONS = {
 
 
 def sections(found: Sequence[RunoutBeside], drawn: Mapping[str, Figure], errors: Mapping[str, float | None] | None = None) -> list[Section]:
-    """Lines with pictures and a table; repeatable and nonrepeatable parts; `errors` are those of before and after, where two scenes were compared."""
+    """Lines with pictures and a table; repeatable and nonrepeatable parts; `errors` are those of
+    before and after, where two scenes were compared."""
     few = f"<p>Drawn are the {PANELS} tests that agree least.</p>" if len(found) > PANELS else ""
     lines = _summary(found, errors) + few + "".join(pictures(drawn, CAPTIONS).values()) + _lines(found)
     return [("Runout, lines measured beside computed", lines), ("Runout, repeatable and nonrepeatable parts", _parts(found))]

@@ -22,7 +22,8 @@ CAPTIONS = {
 
 
 def sections(answer: dict[str, Any], drawn: Mapping[str, Figure]) -> list[Section]:
-    """Verdict, explanations, lines that the effect moves, what is larger than the scene gives, the next test, and what could have been seen."""
+    """Verdict, explanations, lines that the effect moves, what is larger than the scene gives, the
+    next test, and what could have been seen."""
     shown = pictures(drawn, CAPTIONS)
     found = [("Runout: verdict", _verdict(answer))]
     if answer["candidates"]:

@@ -52,7 +52,8 @@ def more_sections(run: Run, speed: float, catalogue: tuple[Effect, ...], progres
 
 
 def turning(spindle: Spindle, temperatures: Sequence[float], speed: float, progress: Callable[[str], None]) -> Iterator[Section]:
-    """Runout and resonance map from the coldest of the temperatures, warm-up from the spindle's reference temperature; of what is left out a sentence that says why."""
+    """Runout and resonance map from the coldest of the temperatures, warm-up from the spindle's
+    reference temperature; of what is left out a sentence that says why."""
     if not spindle.structure.turns:
         yield "Runout, warm-up and resonance map", "<p>Left out, all three: nothing of this machine turns (no body or shaft has <code>turns = true</code>).</p>"
         return

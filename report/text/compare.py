@@ -168,8 +168,8 @@ MOST = 0.5  # of the squares of all errors, from which what is the same at all c
 
 
 def constant_words(c: Comparison) -> str:
-    """Where a scene and a campaign disagree mostly by what is the same at all conditions, and nearly agree without it: a sentence with the figures, and what that may be; else empty, for
-    what is left then may be an effect."""
+    """Where a scene and a campaign disagree mostly by what is the same at all conditions, and nearly agree without
+    it: a sentence with the figures, and what that may be; else empty, for what is left then may be an effect."""
     found = constant_errors(c.tests)
     if found is None or c.rms_residual < AGREES or found.share < MOST or found.without >= ALMOST or not found.frequency:
         return ""
@@ -204,7 +204,8 @@ def _off(m: PairedMode) -> str:
 
 
 def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> None:
-    """The verdict, the table of modes, what has no partner; with `verbose` also the correlation of FRFs, crossings, FRAC and COMAC by point."""
+    """The verdict, the table of modes, what has no partner; with `verbose` also the correlation of
+    FRFs, crossings, FRAC and COMAC by point."""
     console.print(verdict(c), style="bold", highlight=False, markup=False)
     if constant := constant_words(c):
         console.print(constant, highlight=False, markup=False)

@@ -111,7 +111,8 @@ def diagnosed(found: Diagnosis) -> str:
 
 
 def leading(found: Ladder) -> str:
-    """What is said before the table: the diagnosis, or of a ladder of named effects what each of them does; without any, what is wrong as drawn."""
+    """What is said before the table: the diagnosis, or of a ladder of named effects what each of
+    them does; without any, what is wrong as drawn."""
     return diagnosed(found.diagnosis) if found.diagnosis is not None else next(_effects(found), _forms(found))
 
 

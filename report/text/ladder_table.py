@@ -33,8 +33,8 @@ LEGEND = (
 
 @dataclass(frozen=True, eq=False)
 class ResidualMap:
-    """(computed - measured) / standard error by mode (row) and test (column), NaN where not measured; `damping` None without any standard error, then `damping_percent` of the measured ones
-    where there are."""
+    """(computed - measured) / standard error by mode (row) and test (column), NaN where not measured;
+    `damping` None without any standard error, then `damping_percent` of the measured ones where there are."""
 
     modes: list[str]
     tests: list[str]

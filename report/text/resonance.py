@@ -59,7 +59,8 @@ def map_json(found: ResonanceMap) -> dict[str, Any]:
 
 
 def _interpolated_json(found: ResonanceMap) -> dict[str, Any] | None:
-    """How many coincidences are interpolated between grid points, and the errors where others were found both ways; None where all are exact."""
+    """How many coincidences are interpolated between grid points, and the errors where others were
+    found both ways; None where all are exact."""
     i = found.interpolated
     if i is None:
         return None
@@ -147,7 +148,8 @@ def _between(found: ResonanceMap) -> str:
 
 
 def _same_line(crossed: Sequence[Coincidence]) -> list[list[Coincidence]]:
-    """Crossings, those of one wave in several bearings that repeats every revolution together: at one frequency they are one line of the spectrum."""
+    """Crossings, those of one wave in several bearings that repeats every revolution together: at
+    one frequency they are one line of the spectrum."""
     groups: dict[tuple[Any, ...], list[Coincidence]] = {}
     for c in crossed:
         line = c.line
@@ -182,7 +184,8 @@ def told(found: ResonanceMap) -> list[str]:
 
 
 def nearby(found: ResonanceMap) -> list[str]:
-    """One sentence of what is met just beyond the speeds of the map, of what its imperfections excite if they excite any; none where nothing is."""
+    """One sentence of what is met just beyond the speeds of the map, of what its imperfections
+    excite if they excite any; none where nothing is."""
     every = strongest([c for c in found.beyond if c.strength > 0] or found.beyond)
     if not every:
         return []

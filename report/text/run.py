@@ -114,8 +114,8 @@ TWIN = 1e-6
 
 
 def _shared(step: Step, seen: Mapping[int, int]) -> dict[int, int]:
-    """By the number of a mode of the model without a peak of its own that of the identified one which stands for it, too: one nearer than a half-width, and farther than its error, of a mode that
-    this test does not move and see more than ten times as much."""
+    """By the number of a mode of the model without a peak of its own that of the identified one which stands for it, too: one nearer
+    than a half-width, and farther than its error, of a mode that this test does not move and see more than ten times as much."""
     modes, chain, found = step.point.modes, step.point.measurement, dict[int, int]()
     moved = [np.linalg.norm(chain.reference_rows @ m.shape) * np.linalg.norm(chain.response_rows @ m.shape) for m in modes]
     for i in (i for i in range(len(modes)) if i not in seen):
@@ -127,7 +127,8 @@ def _shared(step: Step, seen: Mapping[int, int]) -> dict[int, int]:
 
 
 def _found(step: Step, computed: Mapping[int, Mode], shared: Set[int]) -> str:
-    """How many modes the test shows of those that the model has in the band, and where it is furthest off of those that have a peak of their own."""
+    """How many modes the test shows of those that the model has in the band, and where it is
+    furthest off of those that have a peak of their own."""
     low, high = step.point.spindle.hammer.band
     count = sum(low <= mode.frequency <= high for mode in step.point.modes)
     found = f"{len(step.identified.frequency)} modes were found, {len(computed)} of the {count} that the model has from {low:g} to {high:g} Hz"

@@ -1,7 +1,8 @@
 """What `spindle runout` says and writes: the JSON object, the terminal table, CSV files, figures, and a section for the report.
 
-The repeatable part (RRO) is made of the lines at whole multiples of the turning frequency of the part that is seen, the nonrepeatable one (NRRO) is the rest of the
-record; `averaged` holds the same values with the RRO from averaging over the record's revolutions, which lets some of the other lines through.
+The repeatable part (RRO) is made of the lines at whole multiples of the turning frequency of the part
+that is seen, the nonrepeatable one (NRRO) is the rest of the record; `averaged` holds the same values
+with the RRO from averaging over the record's revolutions, which lets some of the other lines through.
 """
 
 from __future__ import annotations

@@ -157,7 +157,8 @@ def would_change(d: RunoutDiagnosis) -> str:
 
 
 def show_runout_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = False) -> None:
-    """The verdict, what leads to it and the next test; the rest of the explanations, what is larger than the scene gives and smallest sizes where `verbose`."""
+    """The verdict, what leads to it and the next test; the rest of the explanations, what is larger
+    than the scene gives and smallest sizes where `verbose`."""
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     console.print(f"runout: {answer['verdict']}{named}", style="bold")
     console.print(answer["reason"], highlight=False)

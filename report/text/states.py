@@ -73,7 +73,8 @@ def _mode_json(point: OperatingPoint, mode: Mode) -> dict[str, Any]:
 
 
 def _shape_json(point: OperatingPoint, mode: Mode) -> list[dict[str, Any]]:
-    """The shape at the measuring points in their directions, as FRFs show it: largest 1, turned so that what moves in phase is real; nothing where no point moves."""
+    """The shape at the measuring points in their directions, as FRFs show it: largest 1, turned so
+    that what moves in phase is real; nothing where no point moves."""
     seen = point.measurement.response_rows @ mode.shape
     seen = seen * to_real(seen)
     seen = seen / (seen[np.argmax(np.abs(seen.real))].real or 1.0) if len(seen) else seen
@@ -104,8 +105,8 @@ def _changes(value: Array) -> bool:
 
 
 def show_table(console: Console, table: StiffnessTable, radial_load: bool = False) -> None:
-    """Bearings by condition. At speed, where heavy balls have two angles and forces, angle and force are called those of the inner contact; under a `radial_load` the
-    force is called the largest of the balls."""
+    """Bearings by condition. At speed, where heavy balls have two angles and forces, angle and force are
+    called those of the inner contact; under a `radial_load` the force is called the largest of the balls."""
     if not table.values:
         console.print("The scene has no bearings.")
         return
@@ -176,7 +177,8 @@ def show_told_table(console: Console, table: StiffnessTable, radial_load: bool =
 
 
 def _range_of(table: StiffnessTable, values: Mapping[str, Array]) -> str:
-    """From the first condition to the last, of what the bearing has, and the least and the most where they lie between; empty where its table tells neither."""
+    """From the first condition to the last, of what the bearing has, and the least and the most
+    where they lie between; empty where its table tells neither."""
     told = []
     apart = _apart(values)
     for column, words, unit, scale in (
@@ -226,7 +228,8 @@ SPRINGS = "bearings"
 
 
 def static_json(answers: Sequence[Around], bearings: str, beam: str) -> dict[str, Any]:
-    """By point: stiffness (None where nothing holds it), reactions and shares of the compliance; the same `axial`, and `across` where the point measures across the axis."""
+    """By point: stiffness (None where nothing holds it), reactions and shares of the compliance;
+    the same `axial`, and `across` where the point measures across the axis."""
     points = {a.own.point.name: _static_json(a.own) | {"axial": _static_json(a.axial), "across": a.across and _static_json(a.across)} for a in answers}
     return {"bearings": bearings, "beam": beam, "points": points}
 
@@ -274,7 +277,8 @@ def show_static(console: Console, values: dict[str, Any], answers: Sequence[Arou
 
 
 def _told(values: dict[str, Any], answers: Sequence[Around]) -> list[tuple[str, str, dict[str, Any]]]:
-    """Name, direction and answer of the rows shown: every point's own, then, each place once, the axis and what differs the other way across it, where it can move so."""
+    """Name, direction and answer of the rows shown: every point's own, then, each place once, the
+    axis and what differs the other way across it, where it can move so."""
 
     def place(of: Static) -> tuple[object, ...]:
         x, y, z = of.point.position

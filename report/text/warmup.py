@@ -30,7 +30,8 @@ ROLLER_COLUMNS = (("temperature", "C"), ("clearance", "um"), ("radial stiffness"
 def warmup_json(warmup: Warmup) -> dict[str, Any]:
     """Series over `time_s`; a row of `frequencies_Hz` holds all followed modes at one time, null where one was lost.
 
-    `preload_N` is the first ball row's, null where there is none, `friction_W` all bearings' together; `bearings` has each its own, of rollers clearance instead of preload.
+    `preload_N` is the first ball row's, null where there is none, `friction_W` all bearings'
+    together; `bearings` has each its own, of rollers clearance instead of preload.
     """
     moments = warmup.moments
     first = first_row(warmup)
@@ -201,7 +202,8 @@ def _shifts(warmup: Warmup) -> str:
 
 
 def furthest_mode(warmup: Warmup) -> tuple[int, int] | None:
-    """Moment and mode, from 0, of the largest change of a natural frequency since the start; the steady state counts as the last moment. None without modes."""
+    """Moment and mode, from 0, of the largest change of a natural frequency since the start; the
+    steady state counts as the last moment. None without modes."""
     every = warmup.every_frequency
     shift = np.nan_to_num(np.abs(every - every[0]))
     if not shift.size:

@@ -22,8 +22,8 @@ from thermospindle.sim.effects.known import equipped
 
 @dataclass(frozen=True)
 class Answer:
-    """What a verb found: `values` for a script, with a list `warnings` of sentences, and `show`, which prints the same for a person; what it does
-    `then`, when that has been printed."""
+    """What a verb found: `values` for a script, with a list `warnings` of sentences, and `show`,
+    which prints the same for a person; what it does `then`, when that has been printed."""
 
     values: dict[str, Any]
     show: Callable[[Console], None]

@@ -49,7 +49,8 @@ def run(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """The whole chain at every temperature (C, five over the scene's range by default): tables, models, virtual tests, modal peaks, report and Rerun log, in a folder always."""
+    """The whole chain at every temperature (C, five over the scene's range by default): tables,
+    models, virtual tests, modal peaks, report and Rerun log, in a folder always."""
     asked = dict(locals())
     out = Path("out") / load(scene).name if out is None else out
     spindle = with_hammer(with_effects(scene, effect_files)[0], hits, level)
@@ -74,7 +75,8 @@ def impact(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """A virtual impact-hammer test and the modes it shows; a folder holds it as a campaign and a Rerun log of every hit, the FRFs and the peaks."""
+    """A virtual impact-hammer test and the modes it shows; a folder holds it as a campaign and a
+    Rerun log of every hit, the FRFs and the peaks."""
     asked = dict(locals())
     check_out(out)
     spindle = with_hammer(with_effects(scene, effect_files)[0], hits, level)

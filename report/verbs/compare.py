@@ -86,7 +86,8 @@ def _beyond(c: Comparison) -> list[str]:
 
 
 def _by_law_of_damping(c: Comparison) -> list[str]:
-    """Modes damped so much that it matters whether loss grows with frequency: the pole i w sqrt(1 + 2 i z) of a complex stiffness is (1 + z^2) times as large as that of a damper of the same loss."""
+    """Modes damped so much that it matters whether loss grows with frequency: the pole i w sqrt(1 +
+    2 i z) of a complex stiffness is (1 + z^2) times as large as that of a damper of the same loss."""
     high = [m for t in c.tests for m in t.modes if m.damping_computed**2 * m.computed > max(SURE * m.sd, -m.error / 2, m.error)]
     higher = sorted({m.number for m in high if m.error < -0.3 * m.damping_computed**2 * m.computed})
     if not higher:
@@ -126,8 +127,8 @@ def _write(*what: Any, name: str, both: BeforeAfter | None = None) -> None:
 def _of_runout(
     spindle: Spindle, before: Spindle | None, campaign: Campaign, unseen: Sequence[str], verbose: bool
 ) -> tuple[dict[str, Any], Callable[[Console], None], list[RunoutBeside], dict[str, float | None] | None] | None:
-    """The runout tests of a campaign beside the scene, None where it has none: JSON, how it is told, and what the page needs; with `before` the errors of
-    both scenes."""
+    """The runout tests of a campaign beside the scene, None where it has none: JSON, how it is
+    told, and what the page needs; with `before` the errors of both scenes."""
     if not any(test.runout for test in campaign.tests):
         return None
     with progress_bar(len(campaign.tests) * (2 if before else 1)) as progress:

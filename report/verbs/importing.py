@@ -76,8 +76,8 @@ def _write_form(mapping: Path, text: str) -> None:
 
 
 def _for_scene(form: MappingForm, mapping: Path | None, spindle: Spindle | None, scene: Path | None) -> tuple[MappingForm, list[str]]:
-    """The mapping for the scene given; where it names another one, as a copy with another name, with a sentence that says so: points that it tells are the scene's, and nothing it
-    names is another. Else `BadInput`."""
+    """The mapping for the scene given; where it names another one, as a copy with another name, with a sentence
+    that says so: points that it tells are the scene's, and nothing it names is another. Else `BadInput`."""
     if spindle is None or form.spindle in (None, spindle.name):
         return form, []
     if wrong := misfits(form, spindle):
@@ -144,7 +144,8 @@ OUTSIDE = 2.0
 
 
 def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
-    """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz, Hz for rpm; and where nothing does, what the FRFs tell beside the scene's own."""
+    """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz, Hz for
+    rpm; and where nothing does, what the FRFs tell beside the scene's own."""
     from thermospindle.sim.campaign.beside import the_same  # as below
     from thermospindle.sim.campaign.likeness import likenesses
 

@@ -49,7 +49,8 @@ def runout(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """Repeatable and nonrepeatable runout of the turning spindle and its lines, at the scene's nominal speed unless told otherwise; `seed` draws imperfections instead of the scene's.
+    """Repeatable and nonrepeatable runout of the turning spindle and its lines, at the scene's
+    nominal speed unless told otherwise; `seed` draws imperfections instead of the scene's.
 
     A folder holds tables, figures and a Rerun log with a waterfall.
     """
@@ -101,7 +102,8 @@ def warmup(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """From a uniform `temperature` (C) at a speed, the scene's nominal one or 0 for a `soak` in air of another temperature; a folder holds CSV, figure and a Rerun log."""
+    """From a uniform `temperature` (C) at a speed, the scene's nominal one or 0 for a `soak` in air
+    of another temperature; a folder holds CSV, figure and a Rerun log."""
     asked = dict(locals()) | {"verb": "warmup"}
     check_out(out)
     if minutes is not None and minutes * MINUTE < SHORTEST:

@@ -84,7 +84,8 @@ def modes(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """Modes of the linearised rotor-base model up to `highest` (Hz, the scene's band by default); a folder holds `modes.csv` and `spindle.xml`."""
+    """Modes of the linearised rotor-base model up to `highest` (Hz, the scene's band by default); a
+    folder holds `modes.csv` and `spindle.xml`."""
     asked = dict(locals())
     if highest is not None and highest <= 0:
         raise BadInput(f"--highest {highest:g}: must be positive")
@@ -115,10 +116,11 @@ def static(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """Stiffness, bearing reactions and shares of the compliance for a unit force at every measuring point, along its direction, along the axis and the other way across it.
+    """Stiffness, bearing reactions and shares of the compliance for a unit force at every measuring
+    point, along its direction, along the axis and the other way across it.
 
-    `bearings` rated: springs of the stiffness that the scene's bearings are rated at, to rigid ground, the default where all have one and any is a ball row;
-    computed: what the program computes, in the spindle's own housing, the default of others.
+    `bearings` rated: springs of the stiffness that the scene's bearings are rated at, to rigid ground, the default where all
+    have one and any is a ball row; computed: what the program computes, in the spindle's own housing, the default of others.
     """
     asked = dict(locals())
     spindle = _with_beam(with_effects(scene, effect_files)[0], beam)

@@ -89,7 +89,8 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
 
 
 def _doubts(asked: Study, spindles: Sequence[Spindle]) -> list[str]:
-    """What is doubtful about the conditions of a study: a sentence that every design would say is said once, any other with the name of its design."""
+    """What is doubtful about the conditions of a study: a sentence that every design would say is
+    said once, any other with the name of its design."""
     said: dict[str, list[str]] = {}
     for name, spindle in zip(asked.designs or (spindles[0].name,), spindles, strict=True):
         conditions = [Condition(t, n * RPM) for t in asked.temperatures or spindle.temperatures for n in (min(asked.speeds), max(asked.speeds))]

@@ -31,7 +31,8 @@ def workbench(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """A page on this machine alone, served until it is interrupted; what is saved there goes into folders of `out`. `port` 0 is any free one."""
+    """A page on this machine alone, served until it is interrupted; what is saved there goes into
+    folders of `out`. `port` 0 is any free one."""
     if campaign is None:
         bench = open_bench(scene, None, effect_files, left_out=held_out_tests)
     else:

@@ -1,7 +1,7 @@
 """What the workbench computes: a setting beside the tests of a campaign, or at conditions of its own where there is none.
 
-Everything follows from a `Bench` (the scene, its tests, the effects that may be added) and a `Setting`; nothing here knows of a page. Errors are
-those of `spindle compare`, number for number.
+Everything follows from a `Bench` (the scene, its tests, the effects that may be added) and a
+`Setting`; nothing here knows of a page. Errors are those of `spindle compare`, number for number.
 """
 
 from __future__ import annotations
@@ -96,7 +96,8 @@ class Cell:
 
 @dataclass(frozen=True)
 class Errors:
-    """The whole: cells, rms errors in standard errors of fitted and left-out tests (None where there are none), what has no partner, in words."""
+    """The whole: cells, rms errors in standard errors of fitted and left-out tests (None where
+    there are none), what has no partner, in words."""
 
     cells: tuple[Cell, ...]
     fitted: float | None
@@ -114,7 +115,8 @@ def open_bench(
     progress: Callable[[str], None] = lambda done: None,
     left_out: Sequence[str] = (),
 ) -> Bench:
-    """Read a scene and a campaign; FRFs are turned into modes once. Tests `left_out` are those that the scene was not fitted to where none are named.
+    """Read a scene and a campaign; FRFs are turned into modes once. Tests `left_out` are those that
+    the scene was not fitted to where none are named.
 
     `BadInput` for what cannot be used, a campaign of runout alone among it.
     """

@@ -1,4 +1,5 @@
-"""The effects on the bench fitted to the FRF lines, as `spindle diagnose` fits and weighs them: same data, priors, discrepancies and evidence."""
+"""The effects on the bench fitted to the FRF lines, as `spindle diagnose` fits and weighs them:
+same data, priors, discrepancies and evidence."""
 
 from __future__ import annotations
 
@@ -25,8 +26,8 @@ STEPS = 3  # of the progress, beside the tests that are read
 
 @dataclass(frozen=True)
 class Weighed:
-    """Values and standard errors by the names of `Setting.free`, effects' parameters and tolerances; `gain` in ln evidence over tolerances alone, and
-    chi2 per number before and after."""
+    """Values and standard errors by the names of `Setting.free`, effects' parameters and
+    tolerances; `gain` in ln evidence over tolerances alone, and chi2 per number before and after."""
 
     value: dict[str, float]
     sd: dict[str, float]
@@ -38,7 +39,8 @@ class Weighed:
 def weighed(bench: Bench, s: Setting, progress: Callable[[str], None] = lambda done: None) -> Weighed:
     """The effects of a setting, every parameter of them, and all tolerances fitted to the tests that are not left out.
 
-    Fits begin at no size and at that of the setting. `BadInput` where there is nothing to fit to, `NoEquilibrium` where no start has a spindle.
+    Fits begin at no size and at that of the setting. `BadInput` where there is nothing to fit to,
+    `NoEquilibrium` where no start has a spindle.
     """
     if bench.campaign is None:
         raise BadInput("without a campaign there is nothing to fit to")

@@ -1,7 +1,8 @@
-"""The page of one browser tab: it shows a session, and turns what a user does into actions on it. All computing is in `bench`, all states in `state`.
+"""The page of one browser tab: it shows a session, and turns what a user does into actions on it.
+All computing is in `bench`, all states in `state`.
 
-While a slider is dragged, only the newest value is computed; where all tests together take longer than `SMOOTH`, only the shown one is, and where
-that takes longer than `SMOOTH` too, nothing until the slider is let go. The page says which of these it does.
+While a slider is dragged, only the newest value is computed; where all tests together take longer than `SMOOTH`, only the shown
+one is, and where that takes longer than `SMOOTH` too, nothing until the slider is let go. The page says which of these it does.
 """
 
 from __future__ import annotations

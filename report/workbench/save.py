@@ -19,7 +19,8 @@ SOURCE = "set on the workbench"
 
 
 def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Step, ...], out: Path, progress: Callable[[str], None] = lambda done: None) -> list[str]:
-    """Write `scene/`, `workbench.py` and, where there is a campaign, `report/` into the folder `out`, whole or not at all; what was written.
+    """Write `scene/`, `workbench.py` and, where there is a campaign, `report/` into the folder
+    `out`, whole or not at all; what was written.
 
     `BadInput` where something stands there that spindle did not write, or nothing was changed.
     """

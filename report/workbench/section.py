@@ -1,7 +1,7 @@
 """The section as polygons that move with their bodies: where every corner goes in a mode.
 
-A corner at (x, z) of the plane through the axis moves by Re((a + ib) e^(i phase)) in that plane; the plane is the one that the turning body, or
-whatever moves most, moves in.
+A corner at (x, z) of the plane through the axis moves by Re((a + ib) e^(i phase)) in that plane;
+the plane is the one that the turning body, or whatever moves most, moves in.
 """
 
 from __future__ import annotations

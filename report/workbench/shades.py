@@ -35,7 +35,8 @@ def place(value: float, largest: float) -> float:
 def shades(value: float, largest: float) -> tuple[str, str, str, str]:
     """Colour of a cell and of the number in it on a light page, and both on a dark one.
 
-    On the dark page lightness is turned about, hue kept (every channel moves by 1 - largest - smallest), and white becomes the page's ground.
+    On the dark page lightness is turned about, hue kept (every channel moves by 1 - largest -
+    smallest), and white becomes the page's ground.
     """
     light = np.array([np.interp(place(value, largest), np.linspace(-1, 1, len(SCALE)), channel) for channel in SCALE.T])
     ground = _rgb(DARK)

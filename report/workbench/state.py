@@ -1,7 +1,7 @@
 """What is set on the workbench, and how it got there: plain values and pure functions, without a page.
 
-A `Setting` says what differs from the scene as it was opened; a `Session` is the setting now, those before and after it (undo, redo) and the
-steps that were kept (the ladder). Every action returns a new one, and the same object where it changes nothing.
+A `Setting` says what differs from the scene as it was opened; a `Session` is the setting now, those before and after it (undo,
+redo) and the steps that were kept (the ladder). Every action returns a new one, and the same object where it changes nothing.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ FURTHEST = (-0.49, 0.99)  # relative deviations that a scene may have
 
 @dataclass(frozen=True)
 class Setting:
-    """`effects`: parameter values by name of effect, in the order they were added; `deviations`: relative, of toleranced parameters by name, none
-    of zero; `left_out`: ids of tests; `free`: what is to be fitted, tolerances by name and parameters as effect.parameter."""
+    """`effects`: parameter values by name of effect, in the order they were added; `deviations`: relative, of toleranced parameters by
+    name, none of zero; `left_out`: ids of tests; `free`: what is to be fitted, tolerances by name and parameters as effect.parameter."""
 
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     deviations: Mapping[str, float] = field(default_factory=dict)

@@ -1,4 +1,5 @@
-"""Work beside the page: one task at a time in a thread of its own, that tells its progress, can be stopped, and never leaves the page waiting."""
+"""Work beside the page: one task at a time in a thread of its own, that tells its progress, can be
+stopped, and never leaves the page waiting."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ class Stopped(Exception):
 
 
 class Work:
-    """What is at work (`name`, "" for nothing), and how it is stopped; `say` shows a sentence, `halt` is the button that is there meanwhile."""
+    """What is at work (`name`, "" for nothing), and how it is stopped; `say` shows a sentence,
+    `halt` is the button that is there meanwhile."""
 
     def __init__(self, document: Document, halt: Button, say: Callable[..., None]) -> None:
         self.document, self.halt, self.say = document, halt, say

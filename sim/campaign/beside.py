@@ -22,8 +22,8 @@ from thermospindle.sim.operating import OperatingPoint, mass_between, operating_
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """One test: `measured` FRFs at the lines above 0 Hz without those of the running speed, `point`, the model at the test's condition with the test's points, and what the mass `between` nodes of its shafts adds, which a
-    campaign of this program's own has not."""
+    """One test: `measured` FRFs at the lines above 0 Hz without those of the running speed, `point`, the model at the test's condition
+    with the test's points, and what the mass `between` nodes of its shafts adds, which a campaign of this program's own has not."""
 
     test: Test
     measured: Frf
@@ -62,8 +62,8 @@ def check_points(spindle: Spindle, campaign: Campaign) -> None:
 
 
 def on_nodes(spindle: Spindle, points: Sequence[Point]) -> tuple[Point, ...]:
-    """A campaign's points on the nodes that the scene's shafts have: a mesh that was made finer, or that a bearing more divides, has them in other
-    places than when the campaign was written, and height alone says where a point is."""
+    """A campaign's points on the nodes that the scene's shafts have: a mesh that was made finer, or that a bearing
+    more divides, has them in other places than when the campaign was written, and height alone says where a point is."""
     shafts = [_shaft_of(spindle, p) for p in points]
     return tuple(p if shaft is None else replace(p, body=shaft.node_at(p.position[2])) for p, shaft in zip(points, shafts, strict=True))
 
@@ -77,8 +77,8 @@ def _shaft_of(spindle: Spindle, point: Point) -> Shaft | None:
 
 
 def measured_at(spindle: Spindle, campaign: Campaign, test: Test) -> Spindle:
-    """The spindle with the response points of a campaign's test first and its hammer points; of a table of modes with the points of its shapes, or as it is where it tells none. A sensor whose mass the campaign does not
-    tell has that of the scene's point of its node."""
+    """The spindle with the response points of a campaign's test first and its hammer points; of a table of modes with the points of its
+    shapes, or as it is where it tells none. A sensor whose mass the campaign does not tell has that of the scene's point of its node."""
     responses = test.response_nodes
     if not responses:
         return spindle
@@ -105,7 +105,8 @@ def beside(spindle: Spindle, campaign: Campaign, test: Test, condition: Conditio
 
 
 def doubtful(spindle: Spindle, campaign: Campaign) -> list[str]:
-    """What is odd about a campaign before it is compared with a scene, a sentence each; what its FRFs tell beside the scene's own is `likeness`."""
+    """What is odd about a campaign before it is compared with a scene, a sentence each; what its
+    FRFs tell beside the scene's own is `likeness`."""
     return [*of_another(spindle, campaign), *sense.of_conditions(spindle, [condition_of(t) for t in campaign.tests]), *far_from(spindle, campaign), *the_same(campaign), *left_out(campaign)]
 
 
@@ -134,7 +135,8 @@ def far_from(spindle: Spindle, campaign: Campaign) -> list[str]:
 
 
 def of_another(spindle: Spindle, campaign: Campaign) -> list[str]:
-    """A sentence where a campaign names another spindle, and no point of it is one of the scene's by body and place: a table of modes has none, and would be compared with any machine's."""
+    """A sentence where a campaign names another spindle, and no point of it is one of the scene's
+    by body and place: a table of modes has none, and would be compared with any machine's."""
     own = {(p.body, p.position) for p in spindle.points}
     if campaign.spindle == spindle.name or any((p.body, p.position) in own for p in on_nodes(spindle, campaign.points)):
         return []
@@ -152,7 +154,8 @@ def the_same(campaign: Campaign) -> list[str]:
 
 
 def left_out(campaign: Campaign) -> list[str]:
-    """A sentence that names the tests in whose FRFs lines of the running speed stand: those are compared with nothing. Of one test it names the lines too."""
+    """A sentence that names the tests in whose FRFs lines of the running speed stand: those are
+    compared with nothing. Of one test it names the lines too."""
     where = f"{campaign.folder / 'campaign.toml'}: " if campaign.folder else ""
     every = [(t.id, out_of(t.frf, t.speed)) for t in campaign.tests if t.frf is not None]
     found = [(id_, lines) for id_, lines in every if lines.multiples]

@@ -111,7 +111,8 @@ def condition_of(test: Test) -> Condition:
 
 
 def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
-    """The campaign of a folder, or of its campaign.toml. Raises `BadInput`, one sentence naming file, key or set, value and what is allowed."""
+    """The campaign of a folder, or of its campaign.toml. Raises `BadInput`, one sentence naming
+    file, key or set, value and what is allowed."""
     folder = Path(folder)
     folder = folder.parent if folder.name == "campaign.toml" else folder
     file = folder / "campaign.toml"
@@ -160,14 +161,16 @@ def _check_size(file: Path, frf: Frf) -> None:
 
 
 def on_parts(spindle: Spindle, points: Sequence[Point]) -> tuple[Point, ...]:
-    """The points as a campaign is written with them: on bodies and shafts by name, whatever nodes the mesh of a shaft has (`beside.on_nodes` finds them again)."""
+    """The points as a campaign is written with them: on bodies and shafts by name, whatever nodes
+    the mesh of a shaft has (`beside.on_nodes` finds them again)."""
     return tuple(dataclasses.replace(p, body=spindle.structure.carrier(p.body)) for p in points)
 
 
 def write_campaign(campaign: Campaign, folder: Path, replace: bool = False) -> None:
     """Write the folder of a campaign, whole or not at all: beside its place first, then moved there.
 
-    Each test's FRFs go to `<id>.uff`, its runout to `<id>_runout.csv`, all modes to `modes.csv`, their shapes to `shapes.csv`. Raises `BadInput` for what `read_campaign` would refuse, and for a
+    Each test's FRFs go to `<id>.uff`, its runout to `<id>_runout.csv`, all modes to `modes.csv`,
+    their shapes to `shapes.csv`. Raises `BadInput` for what `read_campaign` would refuse, and for a
     folder that is not empty, unless `replace` is set and it holds a campaign, which is then lost.
     """
     folder = Path(folder).absolute()

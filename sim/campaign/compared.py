@@ -13,9 +13,11 @@ from thermospindle.sim.campaign.beside import beside
 from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 
 SILENT = 1e-2
-"""Of the largest FRF of a test, in rms: smaller ones are forbidden by symmetry, and their size is noise; so are lines below as much of its median."""
+"""Of the largest FRF of a test, in rms: smaller ones are forbidden by symmetry, and their size is
+noise; so are lines below as much of its median."""
 ACROSS = -0.5
-"""Mean cosine between measured and computed phases, below which an FRF is reversed: between -0.8 and -1 where it is, and above -0.25 where joints are twice as stiff as drawn."""
+"""Mean cosine between measured and computed phases, below which an FRF is reversed: between -0.8
+and -1 where it is, and above -0.25 where joints are twice as stiff as drawn."""
 LARGEST = 1e30
 """Of any unit: a computed FRF as large as that is of a spindle that no bearing holds."""
 MOST_LINES = 1000
@@ -24,8 +26,8 @@ MOST_LINES = 1000
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """FRFs of one test, measured and computed (responses, references, n) at lines (n,) Hz; `loud` (responses, references) ones in the model, and those that pass a
-    resonance in both, `turning`: all lines may lie between two that are one."""
+    """FRFs of one test, measured and computed (responses, references, n) at lines (n,) Hz; `loud` (responses, references)
+    ones in the model, and those that pass a resonance in both, `turning`: all lines may lie between two that are one."""
 
     frequency: Array
     measured: ComplexArray
@@ -37,7 +39,8 @@ class Compared:
 
 
 def compared(spindle: Spindle, campaign: Campaign, test: Test, scale: float = 1.0) -> Compared | None:
-    """A test at some of its lines, taken `scale` times as high as they are told; None of a table of modes, or where nothing holds the model, or it has no answer."""
+    """A test at some of its lines, taken `scale` times as high as they are told; None of a table of
+    modes, or where nothing holds the model, or it has no answer."""
     own = beside(spindle, campaign, test, condition_of(test))
     if own is None or not own.held or not len(own.measured.frequency):
         return None

@@ -1,9 +1,12 @@
-"""Imported FRFs beside those of the scene: lines in another unit, a channel that is larger by the ratio of two units, one that is reversed, and two that are each other's.
+"""Imported FRFs beside those of the scene: lines in another unit, a channel that is larger by the
+ratio of two units, one that is reversed, and two that are each other's.
 
-A model is never right, and none of this is refused. A factor is told where every FRF of a channel has it in the median over the louder half of its lines, the other sign where
-the phases of all are across from the computed ones there; two channels where each fits the other's computed FRFs at least `BETTER` times as well as its own, in rms of ln
-magnitude about the median, which no factor changes; lines in rad/s for Hz where the FRFs of all tests fit the computed ones so much better there; and the other sense of rotation where the
-phases of all FRFs that depend on it are those of a spindle that turns so. What all tests together do not tell, each may by itself: a sensor that was glued on again between two, or one export in another unit.
+A model is never right, and none of this is refused. A factor is told where every FRF of a channel has it in the median over
+the louder half of its lines, the other sign where the phases of all are across from the computed ones there; two channels
+where each fits the other's computed FRFs at least `BETTER` times as well as its own, in rms of ln magnitude about the median,
+which no factor changes; lines in rad/s for Hz where the FRFs of all tests fit the computed ones so much better there; and the
+other sense of rotation where the phases of all FRFs that depend on it are those of a spindle that turns so. What all tests
+together do not tell, each may by itself: a sensor that was glued on again between two, or one export in another unit.
 """
 
 from __future__ import annotations
@@ -30,8 +33,8 @@ FACTORS = {
 }
 """Measured over computed, and the mistake in a unit that makes it."""
 LARGE, ENDLESS, ALIKE = float(np.log(10**0.5)), float(np.log(1e7)), 0.25
-"""Of ln ratio, from which (10 dB) any other factor is told where all FRFs have it, no mass being drawn so wrong; from which none is, for an FRF that symmetry forbids is computed as 1e-12; and within
-which part of it they have the same."""
+"""Of ln ratio, from which (10 dB) any other factor is told where all FRFs have it, no mass being drawn so wrong; from
+which none is, for an FRF that symmetry forbids is computed as 1e-12; and within which part of it they have the same."""
 WITHIN, SCATTER = 0.15, 1.0
 """Relative, of a factor; and of ln ratio over the lines of an FRF, its median deviation up to which it is one."""
 BETTER = 2.0
@@ -41,8 +44,9 @@ AXES = {1 / (2 * np.pi): "rad/s told as Hz", 2 * np.pi: "Hz told as rad/s"}
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """One FRF: ln of its measured and computed magnitude (n,), the mean cosine between their phases over the louder half of the lines (0 where one of the two passes no
-    resonance: all lines may lie between two that are one), below what each magnitude is silence, and whether the model answers there at all."""
+    """One FRF: ln of its measured and computed magnitude (n,), the mean cosine between their phases over
+    the louder half of the lines (0 where one of the two passes no resonance: all lines may lie between
+    two that are one), below what each magnitude is silence, and whether the model answers there at all."""
 
     response: int
     reference: int
@@ -119,7 +123,8 @@ def _axis(spindle: Spindle, campaign: Campaign, tests: Mapping[str, Sequence[Pai
 
 
 def _misfit(pairs: Sequence[Pair]) -> float:
-    """Rms of ln magnitude between measured and computed, each FRF about its own median; infinite without any, as where the model has no answer."""
+    """Rms of ln magnitude between measured and computed, each FRF about its own median; infinite
+    without any, as where the model has no answer."""
     off = [p.heard[0] - p.heard[1] for p in pairs]
     return float(np.sqrt(np.mean(np.concatenate([x - np.median(x) for x in off]) ** 2))) if off else float("inf")
 
@@ -128,7 +133,8 @@ def _misfit(pairs: Sequence[Pair]) -> float:
 
 
 def _turned(spindle: Spindle, campaign: Campaign) -> str | None:
-    """What is said where, in every test that turns, all FRFs whose phase depends on the sense of rotation, as those from one plane to the other do, are across from the computed ones, and would not be were it the other."""
+    """What is said where, in every test that turns, all FRFs whose phase depends on the sense of rotation, as
+    those from one plane to the other do, are across from the computed ones, and would not be were it the other."""
     found: list[str] = []
     for t in campaign.tests:
         if not t.speed or t.frf is None:
@@ -223,7 +229,8 @@ def _times(factor: float) -> str:
 
 
 def _swapped(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
-    """Two responses, or two hammer points, that are each other's in every test that has both; of the two kinds the one that is fewer, for one exchange looks like others."""
+    """Two responses, or two hammer points, that are each other's in every test that has both; of
+    the two kinds the one that is fewer, for one exchange looks like others."""
     found: list[list[str]] = []
     for what, key, other in (("responses", "response", "reference"), ("hammer points", "reference", "response")):
         nodes = sorted({getattr(p, key) for pairs in tests for p in pairs})
@@ -248,7 +255,8 @@ def _rows(pairs: Sequence[Pair], key: str, other: str) -> dict[int, Row]:
 
 
 def _each_others(rows: Sequence[tuple[Row, Row]]) -> bool:
-    """Of two channels in some tests, whether the other's model fits both at least `BETTER` times as well as their own; by what the model moves at one of the two."""
+    """Of two channels in some tests, whether the other's model fits both at least `BETTER` times as
+    well as their own; by what the model moves at one of the two."""
     told = [(pair, n) for pair in rows for n in pair[0] if pair[0][n].loud or pair[1][n].loud]
     if not told:
         return False

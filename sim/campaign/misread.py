@@ -1,8 +1,9 @@
 """FRFs of another quantity than is told, or with real and imaginary parts exchanged: what fits the scene's once that is undone.
 
-Accelerances told as mobilities are a quarter turn ahead of them and rise with frequency as these do not, and so with every other two; exchanged, a + ib is b + ia, which is i times
-the conjugate: a quarter turn too, and as large as before. Either is told where phases agree with the scene's in every FRF once it is undone, as they do in none as told; a
-quantity two turns away has the phases of a sensor that is reversed, and is told where magnitudes scatter less about the scene's with it.
+Accelerances told as mobilities are a quarter turn ahead of them and rise with frequency as these do not, and so with every
+other two; exchanged, a + ib is b + ia, which is i times the conjugate: a quarter turn too, and as large as before. Either
+is told where phases agree with the scene's in every FRF once it is undone, as they do in none as told; a quantity two turns
+away has the phases of a sensor that is reversed, and is told where magnitudes scatter less about the scene's with it.
 """
 
 from __future__ import annotations

@@ -27,7 +27,8 @@ class ShapeAt:
 
 @dataclass(frozen=True)
 class ModeRow:
-    """One identified mode of one test; None where the table is empty. All modes of a test have shapes at the same nodes, in the same order, or none has one."""
+    """One identified mode of one test; None where the table is empty. All modes of a test have
+    shapes at the same nodes, in the same order, or none has one."""
 
     test: str
     mode: int

@@ -1,8 +1,8 @@
 """Runout of one test of a campaign: displacement records over time, or their amplitude spectra, as CSV or as dataset 58 of a UFF file.
 
-CSV columns: `time_s` and one `<node>_um` (`_nm`, `_mm`, `_m`) a probe for a record; `frequency_Hz`, `<node>_um` (zero to peak) and, if known,
-`<node>_deg` for a spectrum. UFF: function type 1 (time response) or 12 (spectrum, complex). A probe is a point of the campaign and looks along its
-direction. The window of a spectrum must be stated: what a bin holds of a line depends on it.
+CSV columns: `time_s` and one `<node>_um` (`_nm`, `_mm`, `_m`) a probe for a record; `frequency_Hz`, `<node>_um` (zero to peak)
+and, if known, `<node>_deg` for a spectrum. UFF: function type 1 (time response) or 12 (spectrum, complex). A probe is a point of
+the campaign and looks along its direction. The window of a spectrum must be stated: what a bin holds of a line depends on it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from thermospindle.sim.campaign.uff import read_motion
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 WINDOWS = {"none": 1.0, "hann": 1.5, "flattop": 3.7702}
-"""Noise power bandwidth in bins: the squares of a line's bins add up to so many squares of its amplitude (Harris, *Proc. IEEE* 66 (1978) 51)."""
+"""Noise power bandwidth in bins: the squares of a line's bins add up to so many squares of its
+amplitude (Harris, *Proc. IEEE* 66 (1978) 51)."""
 FEWEST = 4.0  # revolutions: less cannot tell lines from each other
 HELD = 8  # equal samples in a row that no probe shows: it is saturated or has lost its signal
 UNEVEN = 1e-3  # of a step
@@ -64,7 +65,8 @@ def check_revolutions(where: str, record: RunoutRecord, rate: float, whose: str 
 def read_runout(file: Path, points: Sequence[Point], speed: float, window: str | None) -> RunoutRecord:
     """The record of a file, checked; `speed` (rad/s) of the test and `window` as its table states them.
 
-    Raises `BadInput` naming file and column or set for wrong units, unknown nodes, gaps, NaN, dead or held channels, a record of few revolutions.
+    Raises `BadInput` naming file and column or set for wrong units, unknown nodes, gaps, NaN, dead
+    or held channels, a record of few revolutions.
     """
     if not file.is_file():
         raise BadInput(f"{file}: {absent(file)}")

@@ -1,7 +1,7 @@
 """A virtual runout campaign: the spindle runs in MuJoCo at several temperatures and speeds, and noisy probes look at it.
 
-Between two tests a real spindle stops: its ball sets come to stand elsewhere, and every ball has turned about its own axis. `set_down` does the same to
-imperfections: ring waves keep their place on their rings, and the size of each ball and the cage stay together.
+Between two tests a real spindle stops: its ball sets come to stand elsewhere, and every ball has turned about its own axis. `set_down`
+does the same to imperfections: ring waves keep their place on their rings, and the size of each ball and the cage stay together.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ def _set_down(row: RowImperfections, balls: int, random: np.random.Generator) ->
     spins = random.uniform(0, 2 * np.pi, len(row.ball_waves) or balls)
 
     def seen(waves: tuple[Wave, ...]) -> tuple[Wave, ...]:
-        """A row `turned` / Z on meets the waves it feels, of order k Z or k Z +- 1, so much of k Z later; their own place on the ring stays."""
+        """A row `turned` / Z on meets the waves it feels, of order k Z or k Z +- 1, so much of k Z
+        later; their own place on the ring stays."""
         return tuple(replace(w, phase=w.phase + round(w.order / balls) * turned) for w in waves)
 
     def onward(each: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -71,7 +72,8 @@ def excited(point: OperatingPoint, imperfections: Imperfections) -> OperatingPoi
 def hub_points(spindle: Spindle) -> tuple[Point, ...]:
     """Five probes on the hub as points of a campaign, with nodes above the scene's own: across the axis in two planes, and along it.
 
-    One plane alone cannot tell the bearings from each other (ISO 230-7:2015 measures a spindle's error motions, tilt among them, with five sensors).
+    One plane alone cannot tell the bearings from each other (ISO 230-7:2015 measures a spindle's
+    error motions, tilt among them, with five sensors).
     """
     top = hub_probes(spindle)
     below = second_plane(spindle)

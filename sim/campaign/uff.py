@@ -229,7 +229,8 @@ def _sign(where: str, record: Mapping[str, Any], end: str, points: Sequence[Poin
 
 
 def _frequency(where: str, record: Mapping[str, Any], exact: np.ndarray | None) -> np.ndarray:
-    """Frequencies (n,) in Hz of a set, rising; in even steps (the file's `exact` ones where it has them) unless the set says that they are not."""
+    """Frequencies (n,) in Hz of a set, rising; in even steps (the file's `exact` ones where it has
+    them) unless the set says that they are not."""
     kind, label, lines = record["abscissa_spec_data_type"], record["abscissa_axis_units_lab"].strip(), record["x"]
     if kind not in (0, 18) or label not in ("Hz", "", "NONE") or (kind == 0 and label != "Hz"):
         raise BadInput(f"{where}: abscissa of type {kind} in {label!r}; only frequency (18) in Hz is allowed")
@@ -265,7 +266,8 @@ def _scale(where: str, record: Mapping[str, Any], side: str, wanted: int, system
 
 
 def factor(where: object, system: Mapping[str, Any], of: str) -> float:
-    """What values in the file's unit of `of` ("length", "force") are divided by for SI, of its dataset 164. `BadInput` for what is no factor."""
+    """What values in the file's unit of `of` ("length", "force") are divided by for SI, of its
+    dataset 164. `BadInput` for what is no factor."""
     value = float(system[of])
     if not SMALLEST <= value <= LARGEST:
         raise BadInput(f"{where}: data set 164: the factor of {of} = {value:g}: must lie between {SMALLEST:g} and {LARGEST:g}")

@@ -141,7 +141,8 @@ def usable(spindle: Spindle, catalogue: Sequence[Effect] = CATALOGUE) -> tuple[E
 
 
 def checked(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
-    """All parameter values of an effect, neutral where not given; `BadInput` for unknown names, values beyond the limits, and fractions of what is counted."""
+    """All parameter values of an effect, neutral where not given; `BadInput` for unknown names,
+    values beyond the limits, and fractions of what is counted."""
     known = {p.name: p for p in effect.parameters}
     for name, value in values.items():
         if name not in known:

@@ -1,8 +1,8 @@
 """What a physical effect is: a file with its equation, parameters and pure functions that change what one step of the chain sees.
 
-A condition, as it is said to be, flows  the condition as it is -> spindle -> region temperatures -> ring motions -> bearing pair -> rotor-base chain -> measurement;  an effect changes
-any of these, and at its neutral values it changes nothing, exactly. Effects are applied in the order of the scene. No other code
-knows an effect by name: where it seemed to need to, the state would lack a field.
+A condition, as it is said to be, flows  the condition as it is -> spindle -> region temperatures -> ring motions -> bearing pair ->
+rotor-base chain -> measurement;  an effect changes any of these, and at its neutral values it changes nothing, exactly. Effects are
+applied in the order of the scene. No other code knows an effect by name: where it seemed to need to, the state would lack a field.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class Parameter:
     source: str
     choices: tuple[float, ...] = ()
     counts: str = ""
-    """What its choices are the numbers of, from 0: "bearings" a spindle's ball bearings, "all bearings" those of any kind, "sets" what shares a preload, "rings" the inner and the outer one of a bearing.
-    One that is -1 where neutral stands for all of them there."""
+    """What its choices are the numbers of, from 0: "bearings" a spindle's ball bearings, "all bearings" those of any kind, "sets" what
+    shares a preload, "rings" the inner and the outer one of a bearing. One that is -1 where neutral stands for all of them there."""
 
     @property
     def sign(self) -> float:
@@ -79,7 +79,8 @@ PARTS: Mapping[str, Callable[[Spindle], bool]] = {
 
 
 def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
-    """The effect with its parameters as plausible for a spindle: sizes in its scale, to two digits, a choice for each of its bearings, and what is meant by the scene's own names.
+    """The effect with its parameters as plausible for a spindle: sizes in its scale, to two digits,
+    a choice for each of its bearings, and what is meant by the scene's own names.
 
     Limits only widen. On the reference spindle it is the effect itself, and so is one that has been fitted already.
     """
@@ -155,7 +156,8 @@ def which_parameter(name: str, counts: str, here: int, meaning: str, source: str
 
 
 def chosen(values: Values, name: str, names: Sequence[str]) -> tuple[str, ...]:
-    """Those that the value of a `which_parameter` means; all of them where there is none, as in scripts from before there was such a choice."""
+    """Those that the value of a `which_parameter` means; all of them where there is none, as in
+    scripts from before there was such a choice."""
     number = values.get(name, ALL)
     return tuple(names) if number == ALL else (names[int(number)],)
 
@@ -213,11 +215,11 @@ class Effect:
     `imperfections(spindle, condition, values, imperfections)` what excites the running spindle;
     `measurement(spindle, condition, values, chain, measurement)` the measuring chain.
 
-    `acts_on` names the parts of a spindle (`PARTS`) without any of which the effect has nothing to act on; `idle(spindle)` says why it
-    has nothing to act on in a spindle that has them, `outside(spindle)` why that spindle is outside its validity; None
-    where neither is so (`refusal` asks both). `sized(spindle)` gives what is plausible for a machine of that size: factors by parameter
-    name, of typical size, prior and limits, for sizes that are written for the reference spindle; `meant(spindle)` the meaning of parameters, by name, with the
-    names that the scene has for its parts.
+    `acts_on` names the parts of a spindle (`PARTS`) without any of which the effect has nothing to act on; `idle(spindle)`
+    says why it has nothing to act on in a spindle that has them, `outside(spindle)` why that spindle is outside its
+    validity; None where neither is so (`refusal` asks both). `sized(spindle)` gives what is plausible for a machine of
+    that size: factors by parameter name, of typical size, prior and limits, for sizes that are written for the reference
+    spindle; `meant(spindle)` the meaning of parameters, by name, with the names that the scene has for its parts.
     """
 
     name: str

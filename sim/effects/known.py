@@ -1,4 +1,5 @@
-"""Every effect there is, those of a user's own files and of installed packages among them, and the spindle of a scene with its effects found."""
+"""Every effect there is, those of a user's own files and of installed packages among them, and the
+spindle of a scene with its effects found."""
 
 from __future__ import annotations
 

@@ -11,14 +11,16 @@ EQUATION = "s = {share}, or after a told soak time t s = exp(-t / tau) with tau 
 
 
 def left_after(condition: Condition, first: float, values: Values) -> float:
-    """Share of a rise that is missing after a condition's soak time, if `first` is after the nominal one; `first` itself where no soak time is told."""
+    """Share of a rise that is missing after a condition's soak time, if `first` is after the
+    nominal one; `first` itself where no soak time is told."""
     if first == 0.0 or not np.isfinite(condition.soak_time):
         return first
     return float(first ** (condition.soak_time / values["nominal_soak"]))
 
 
 def held_back(spindle: Spindle, missing: float, by_region: dict[str, float], *, turning: bool) -> dict[str, float]:
-    """Temperatures (C) where the turning part, or all that stands, lacks the share `missing` of its rise over the reference; the same object where none is."""
+    """Temperatures (C) where the turning part, or all that stands, lacks the share `missing` of its
+    rise over the reference; the same object where none is."""
     if missing == 0.0:
         return by_region
     reference = spindle.reference_temperature

@@ -97,7 +97,8 @@ def guarded(effect: Effect, where: str) -> OwnEffect:
 
 
 def effect_of(file: Path, where: str = "") -> OwnEffect:
-    """The EFFECT of a Python file, called `where` in messages; `BadInput` where there is none, naming file and line. A file is run once until it is changed."""
+    """The EFFECT of a Python file, called `where` in messages; `BadInput` where there is none,
+    naming file and line. A file is run once until it is changed."""
     if not file.is_file():
         raise BadInput(f"--effect {where or file}: {absent(file)}; it must be a Python file that defines EFFECT")
     return _effect_of(file.resolve(), where or str(file), file.stat().st_mtime_ns)

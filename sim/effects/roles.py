@@ -75,7 +75,8 @@ def beyond(value: float, play: float) -> float:
 def in_series(element: Element, flexibility: Array) -> Element:
     """The element with a lossless flexibility (5, 5) at its end.
 
-    K_s = (1 + K F)^-1 K; its damping to first order of complex stiffness K + i omega D: (1 + K F)^-1 D (1 + F K)^-1. A loss factor is of K alone (`Element.lossy`).
+    K_s = (1 + K F)^-1 K; its damping to first order of complex stiffness K + i omega D: (1 + K
+    F)^-1 D (1 + F K)^-1. A loss factor is of K alone (`Element.lossy`).
     """
     pass_on = np.linalg.inv(np.eye(5) + element.stiffness @ flexibility)
     stiffness, damping = pass_on @ element.stiffness, pass_on @ element.damping @ pass_on.T

@@ -31,7 +31,8 @@ class Broken(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An effect under guard, and a spindle to try it on: its words (`every_word`), conditions it bears, and what is seen of it without the effect."""
+    """An effect under guard, and a spindle to try it on: its words (`every_word`), conditions it
+    bears, and what is seen of it without the effect."""
 
     effect: Effect
     spindle: Spindle

@@ -32,7 +32,8 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """FRFs of one test. `h1` has coherence and standard errors, of a single hit neither; `h2` is the estimator biased by response noise instead."""
+    """FRFs of one test. `h1` has coherence and standard errors, of a single hit neither; `h2` is
+    the estimator biased by response noise instead."""
 
     h1: Frf
     h2: ComplexArray
@@ -87,11 +88,11 @@ def _force_window(time: Array, force: Array, open_for: float) -> Array:
 def _standard_error(v: ComplexArray, f: ComplexArray, h1: ComplexArray) -> Array:
     """Standard error of H1, sqrt(E |error|^2), from the scatter between hits.
 
-    The residual v - H1 f of a hit is the response channel's noise less H1 times the force channel's. Its power is
-    a + b |H1|^2 + c |H1|^2 |f|^2 with a, b, c >= 0: noise of either channel that is white over the band, and noise in proportion to the
-    line itself (speckle, scatter of the hit), which falls with the force of a soft tip where white noise does not. They are fitted to the
-    residuals of all hits and lines of one FRF, each line weighted by its expected power: three hits alone say too little about one line. With a single hit there is no
-    scatter, and the error is infinite.
+    The residual v - H1 f of a hit is the response channel's noise less H1 times the force channel's. Its power is a + b
+    |H1|^2 + c |H1|^2 |f|^2 with a, b, c >= 0: noise of either channel that is white over the band, and noise in proportion
+    to the line itself (speckle, scatter of the hit), which falls with the force of a soft tip where white noise does not.
+    They are fitted to the residuals of all hits and lines of one FRF, each line weighted by its expected power: three hits
+    alone say too little about one line. With a single hit there is no scatter, and the error is infinite.
     """
     hits = v.shape[1]
     if hits < 2:
@@ -106,9 +107,10 @@ def _standard_error(v: ComplexArray, f: ComplexArray, h1: ComplexArray) -> Array
 
 
 def _noise_power(residual: Array, terms: Array) -> Array:
-    """The sum of not negative `terms` (n, m) under which residual powers (n,) are likeliest, each exponential about it as squares of complex noise are: its coefficients rise and fall by
-    factors, each step to a likelier sum, from all terms alike (majorisation-minimisation of Fevotte & Idier 2011, *Neural Computation* 23, 2421, for beta = 0, exponent 1 / (2 - beta); none of them is lost on the way, as one may be
-    where squares are weighted with the fit itself)."""
+    """The sum of not negative `terms` (n, m) under which residual powers (n,) are likeliest, each exponential about it
+    as squares of complex noise are: its coefficients rise and fall by factors, each step to a likelier sum, from all
+    terms alike (majorisation-minimisation of Fevotte & Idier 2011, *Neural Computation* 23, 2421, for beta = 0, exponent
+    1 / (2 - beta); none of them is lost on the way, as one may be where squares are weighted with the fit itself)."""
     size = residual.mean()
     if size == 0:  # without noise
         return np.full_like(residual, 1e-300)

@@ -1,6 +1,8 @@
-"""Which modes a hammer test shows: how high each one's peak is where the hammers strike, which no FRF shows, and which are the same shape in two planes.
+"""Which modes a hammer test shows: how high each one's peak is where the hammers strike, which no
+FRF shows, and which are the same shape in two planes.
 
-Ewins, *Modal Testing* (2000), 2.5-2.7: a mode's term in the mobility is residue / (i omega - pole), at its resonance |residue| / (damping ratio x omega).
+Ewins, *Modal Testing* (2000), 2.5-2.7: a mode's term in the mobility is residue / (i omega - pole),
+at its resonance |residue| / (damping ratio x omega).
 """
 
 from __future__ import annotations
@@ -38,8 +40,8 @@ def peaks(point: OperatingPoint, modes: Sequence[Mode]) -> Array:
 def unseen(point: OperatingPoint, band: tuple[float, float], widths: float = 2.0) -> list[Mode]:
     """Modes within a band (Hz) that no FRF of the points and hammers shows.
 
-    At a mode's frequency its own term of an FRF, with those of modes less than so many half-widths away, is below `SEEN` of the whole FRF there: its
-    peak is a change of the curve by no more than that.
+    At a mode's frequency its own term of an FRF, with those of modes less than so many half-widths away,
+    is below `SEEN` of the whole FRF there: its peak is a change of the curve by no more than that.
     """
     within, m = [mode for mode in point.modes if band[0] <= mode.frequency <= band[1]], point.measurement
     if not within:
@@ -57,8 +59,8 @@ def unseen(point: OperatingPoint, band: tuple[float, float], widths: float = 2.0
 
 
 def most_excited(point: OperatingPoint, modes: Sequence[Mode], count: int) -> list[int]:
-    """At most `count` indices of `modes`, rising: those with the highest peaks. The lesser one of a pair that is one shape in two planes is taken only where places are left, and then
-    what no hammer excites."""
+    """At most `count` indices of `modes`, rising: those with the highest peaks. The lesser one of a pair
+    that is one shape in two planes is taken only where places are left, and then what no hammer excites."""
     height = peaks(point, modes)
     order = [int(i) for i in np.argsort(-height, kind="stable")]
     profiles = [_profile(point, m) for m in modes]
@@ -70,9 +72,11 @@ def most_excited(point: OperatingPoint, modes: Sequence[Mode], count: int) -> li
 
 
 def _profile(point: OperatingPoint, mode: Mode) -> ComplexArray:
-    """A shape along the axis with its plane left aside, of length 1 in terms of mass: axial motion, then the lateral motion and tilt that both planes share most of.
+    """A shape along the axis with its plane left aside, of length 1 in terms of mass: axial motion,
+    then the lateral motion and tilt that both planes share most of.
 
-    Planes are the columns of a matrix, whose first left singular vector is what they share: all of it for a shape in one plane, however that lies, and for a whirl.
+    Planes are the columns of a matrix, whose first left singular vector is what they share: all of
+    it for a shape in one plane, however that lies, and for a whirl.
     """
     moved = dict(zip(point.linear.dofs, np.sqrt(np.diag(point.linear.mass)) * mode.shape, strict=True))
     bodies = list(dict.fromkeys(body for body, _ in moved))

@@ -1,9 +1,11 @@
-"""Records of a hammer test by the reduced model, without MuJoCo: the linear spindle stepped exactly, for long records and for beams too stiff to step.
+"""Records of a hammer test by the reduced model, without MuJoCo: the linear spindle stepped
+exactly, for long records and for beams too stiff to step.
 
-M, C + G and K are projected on the basis of `model.rotor.reduced`, up to half the sampling rate and between the scene's points. With the force held over a
-step the state (q, q') is carried on by the matrix exponential of its own equation (Franklin, Powell & Workman, *Digital Control of Dynamic Systems*,
-1998, 4.3), which has no error of its own at any step. What differs from the whole linear model is the basis, 1e-5 of the largest response, and the
-images of the held force (`sim.hammer.test`), (pi f step)^4 / 15 of a mass's FRF: the step is chosen so that this stays below `IMAGES` at the end of the band. Measured on
+M, C + G and K are projected on the basis of `model.rotor.reduced`, up to half the sampling rate and between the scene's points.
+With the force held over a step the state (q, q') is carried on by the matrix exponential of its own equation (Franklin, Powell
+& Workman, *Digital Control of Dynamic Systems*, 1998, 4.3), which has no error of its own at any step. What differs from the
+whole linear model is the basis, 1e-5 of the largest response, and the images of the held force (`sim.hammer.test`), (pi f
+step)^4 / 15 of a mass's FRF: the step is chosen so that this stays below `IMAGES` at the end of the band. Measured on
 `five_bearing`, at lines where all points hardly move: 5e-5 of their rms (`tests/sim/hammer/test_reduced_records.py`).
 """
 
@@ -38,7 +40,8 @@ def with_long_step(test: HammerTest) -> HammerTest:
 def simulate_reduced(
     point: OperatingPoint, test: HammerTest, hits: Sequence[Sequence[Hit]], steps: int, progress: Callable[[str], None] = lambda done: None
 ) -> tuple[Array, Array]:
-    """Held force (references, hits, steps) and mean velocity over the same steps (references, hits, responses, steps) of the hits on every hammer node."""
+    """Held force (references, hits, steps) and mean velocity over the same steps (references, hits,
+    responses, steps) of the hits on every hammer node."""
     rows = point_rows(point.spindle, point.chain)
     hammers = point_rows(point.spindle, point.chain, test.hammer_nodes)
     small = reduced(point.linear, np.concatenate([rows, hammers]), np.pi * test.sample_rate)

@@ -1,10 +1,10 @@
 """The virtual impact-hammer test: MuJoCo in time, acquisition as a laboratory does it, and FRFs with standard errors.
 
 Every hit is a full time simulation (RK4); all hits run side by side in C (`sim.side_by_side`), no Python between steps. Forces are
-controls held over a step, and a held force has images about the rate of integration. Velocity read once a step folds them back, for a mass, whose velocity
-falls as 1/f, as a part (pi f step)^2 / 3 of the FRF; and it is the mass of a node alone that answers so fast: at the nose of `five_bearing` 3e-3 of the FRF at 3.9 kHz,
-half of its noise. So velocity is read as its mean over a step, the way made in it, which lets nothing through at the images' centres: (pi f step)^4 / 15
-are left, 6e-6 at 6 kHz and 5 us.
+controls held over a step, and a held force has images about the rate of integration. Velocity read once a step folds them back,
+for a mass, whose velocity falls as 1/f, as a part (pi f step)^2 / 3 of the FRF; and it is the mass of a node alone that answers so
+fast: at the nose of `five_bearing` 3e-3 of the FRF at 3.9 kHz, half of its noise. So velocity is read as its mean over a step, the
+way made in it, which lets nothing through at the images' centres: (pi f step)^4 / 15 are left, 6e-6 at 6 kHz and 5 us.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ def impact_tests(
 ) -> list[ImpactTest]:
     """Impact tests at several operating points of one spindle, with as many hits side by side as there are cores.
 
-    `settings` default to the scene's. `element` is one of `model.rotor.elements.HAMMER`, by default the `usual` one. The same seed gives the same test.
-    `progress` is told of every piece of the records and of every point, `stages` times in all.
+    `settings` default to the scene's. `element` is one of `model.rotor.elements.HAMMER`, by default the `usual` one. The same
+    seed gives the same test. `progress` is told of every piece of the records and of every point, `stages` times in all.
     """
     test = settings or points[0].spindle.hammer
     check_band(test, str(points[0].spindle.file or points[0].spindle.name))
@@ -107,12 +107,14 @@ def impact_tests(
 
 
 def usual(test: HammerTest) -> str:
-    """The element of a hammer test for which none is asked: linear; reduced where the steps of a record are more than can be computed, of beams whose stiffest mode is far above the band."""
+    """The element of a hammer test for which none is asked: linear; reduced where the steps of a
+    record are more than can be computed, of beams whose stiffest mode is far above the band."""
     return LINEAR if sampling(test)[1] <= MOST_STEPS else REDUCED
 
 
 def takes_long(spindle: Spindle, element: str | None, temperatures: int) -> str:
-    """What is said before hammer tests at so many temperatures whose linear model takes MuJoCo more than a minute, as those of many beam elements do; empty where it does not, and of other elements."""
+    """What is said before hammer tests at so many temperatures whose linear model takes MuJoCo more
+    than a minute, as those of many beam elements do; empty where it does not, and of other elements."""
     test = spindle.hammer
     _, steps = sampling(test)
     dofs, hits = sum(len(b.moves) for b in spindle.structure.bodies), test.hits * len(test.hammer_nodes) * temperatures
@@ -163,14 +165,15 @@ def sampling(test: HammerTest) -> tuple[int, int]:
 
 
 def damped_throughout(elements: Iterable[Element | Joint], freedom: int) -> list[str]:
-    """Groups of elements, or joints, whose loss factors make more dampers between all degrees of freedom than MuJoCo steps: `check_step` says why."""
+    """Groups of elements, or joints, whose loss factors make more dampers between all degrees of
+    freedom than MuJoCo steps: `check_step` says why."""
     return list(dict.fromkeys(e.group for e in elements if e.loss_factor)) if freedom > LARGE else []
 
 
 def check_step(point: OperatingPoint, step: float, stepless: str) -> None:
-    """Refuse a step at which Runge-Kutta 4 would be unstable: |pole| step < 2.78 on the imaginary axis (Hairer & Wanner, IV.2); and loss factors of a flexible shaft, whose
-    dampers lie between all its nodes (`model.rotor.loss`): 48,000 places of tendons for 220 degrees of freedom, with which a step takes MuJoCo 78 ms in place of 0.2.
-    `stepless` is the option that takes no steps."""
+    """Refuse a step at which Runge-Kutta 4 would be unstable: |pole| step < 2.78 on the imaginary axis (Hairer & Wanner, IV.2);
+    and loss factors of a flexible shaft, whose dampers lie between all its nodes (`model.rotor.loss`): 48,000 places of tendons
+    for 220 degrees of freedom, with which a step takes MuJoCo 78 ms in place of 0.2. `stepless` is the option that takes no steps."""
     freedom = len(point.chain.dofs)
     if lossy := damped_throughout(point.chain.elements, freedom):
         raise BadInput(
@@ -192,10 +195,11 @@ def simulate(
     steps: int,
     progress: Callable[[str], None] = lambda done: None,
 ) -> list[tuple[Array, Array]]:
-    """Held force (references, hits, steps) and mean velocity over the same steps (references, hits, responses, steps) of every model's hits, all at once in C.
+    """Held force (references, hits, steps) and mean velocity over the same steps (references, hits,
+    responses, steps) of every model's hits, all at once in C.
 
-    `hits[model][reference]` are the hits on one hammer node. Records are made in `PIECES`, each from where the last one ended: what is between
-    needs no memory, and `progress` is told.
+    `hits[model][reference]` are the hits on one hammer node. Records are made in `PIECES`, each
+    from where the last one ended: what is between needs no memory, and `progress` is told.
     """
     held = np.array([[[force(hit, test.step, steps) for hit in row] for row in own] for own in hits])
     count, references, repeats = held.shape[:3]
@@ -229,8 +233,8 @@ def looking(model: mujoco.MjModel) -> Array:
 
 
 def _seen(looks: Array, states: Array) -> Array:
-    """What vibrometers see (models, sensors, steps) along `looks` (models, sensors, nq) of states (models, steps, nstate), whose coordinates stand behind the time; of
-    each step the same to the last bit whatever others there are, as a BLAS does not have it."""
+    """What vibrometers see (models, sensors, steps) along `looks` (models, sensors, nq) of states (models, steps, nstate), whose
+    coordinates stand behind the time; of each step the same to the last bit whatever others there are, as a BLAS does not have it."""
     return np.asarray(np.einsum("mrq,msq->mrs", looks, states[:, :, 1 : 1 + looks.shape[2]]))
 
 
@@ -260,8 +264,9 @@ def acquire(
 ) -> Record:
     """Anti-alias filter, sampling, what the measuring chain does to the channels (gain, delay, a window nobody noted), sensor noise.
 
-    `held` is the force over each step, `velocity` its mean over the same. With the hold's own sinc f step the force channel gets that of such a mean, which
-    velocity has: none is left in the FRF. The same linear-phase filter runs over both, of an even number of terms: samples stand at the ends of steps.
+    `held` is the force over each step, `velocity` its mean over the same. With the hold's own sinc f step
+    the force channel gets that of such a mean, which velocity has: none is left in the FRF. The same
+    linear-phase filter runs over both, of an even number of terms: samples stand at the ends of steps.
     """
     from scipy.signal import firwin, resample_poly  # takes half a second to load, and most verbs strike nothing
 

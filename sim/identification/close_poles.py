@@ -4,8 +4,9 @@ Within their width FRFs tell the terms of a pair badly one by one but well in it
 
     R_1 / (s - p_1) + R_2 / (s - p_2)  =  S_0 / (s - p) + S_1 / (s - p)^2 + ...,   S_j = (p_1 - p)^j R_1 + (p_2 - p)^j R_2.
 
-Forward and backward whirl have shapes that differ at the points across from the hammer alone, by however little of the whole: S_1 is not in the direction of S_0. One mode that
-was not the same at all times has one shape wherever it was. Where references excite the two differently their residues are known one by one, and the shapes themselves are asked.
+Forward and backward whirl have shapes that differ at the points across from the hammer alone, by however little of the
+whole: S_1 is not in the direction of S_0. One mode that was not the same at all times has one shape wherever it was.
+Where references excite the two differently their residues are known one by one, and the shapes themselves are asked.
 """
 
 from __future__ import annotations
@@ -44,10 +45,12 @@ def one_shape(lines: Lines, fit: Fit, pairs: NDArray[np.bool_]) -> NDArray[np.bo
 
 
 def second_moment(lines: Lines, fit: Fit, i: int, j: int) -> tuple[complex, float]:
-    """Central second moment w_1 w_2 (p_1 - p_2)^2 of two poles, w the parts of S_0 that are either's, and the standard error of its real and its imaginary part.
+    """Central second moment w_1 w_2 (p_1 - p_2)^2 of two poles, w the parts of S_0 that are
+    either's, and the standard error of its real and its imaginary part.
 
-    Of equal halves it is (p_1 - p_2)^2 / 4. The error is that of S_2 in units of S_0 with S_0, S_1 and all other residues free, and other poles held. Under an exponential window, which
-    the fit does not weigh, an amplitude of t^2 exp(-b t) has `alike` (b / (a + 2 d))^5 times the variance, as one of t exp(-b t) has it to the third power (`modal`).
+    Of equal halves it is (p_1 - p_2)^2 / 4. The error is that of S_2 in units of S_0 with S_0, S_1 and all other residues
+    free, and other poles held. Under an exponential window, which the fit does not weigh, an amplitude of t^2 exp(-b t)
+    has `alike` (b / (a + 2 d))^5 times the variance, as one of t exp(-b t) has it to the third power (`modal`).
     """
     total, middle = fit.residues[i] + fit.residues[j], (fit.poles[i] + fit.poles[j]) / 2
     w = np.vdot(total, fit.residues[j]) / np.vdot(total, total)
@@ -66,10 +69,12 @@ def second_moment(lines: Lines, fit: Fit, i: int, j: int) -> tuple[complex, floa
 
 
 def beyond_first_order(lines: Lines, fit: Fit, i: int, j: int) -> float:
-    """Variance, of the real and of the imaginary part of either of two poles, that errors of first order lack; none of a pair that is `PARTED`.
+    """Variance, of the real and of the imaginary part of either of two poles, that errors of first
+    order lack; none of a pair that is `PARTED`.
 
-    The root of a second moment of hardly more than its error is no Gaussian number. And about a middle that is off by e, S_2 is off by 2 e S_1, which nothing but the part q of S_1 across S_0 tells
-    from another second moment: e = error |S_0| / (2 |q|), but no more than a pair of that second moment can be wide.
+    The root of a second moment of hardly more than its error is no Gaussian number. And about a middle that
+    is off by e, S_2 is off by 2 e S_1, which nothing but the part q of S_1 across S_0 tells from another
+    second moment: e = error |S_0| / (2 |q|), but no more than a pair of that second moment can be wide.
     """
     second, error = second_moment(lines, fit, i, j)
     total, half = fit.residues[i] + fit.residues[j], (fit.poles[i] - fit.poles[j]) / 2
@@ -89,7 +94,8 @@ def _shape(fit: Fit, r: int) -> tuple[ComplexArray, ComplexArray]:
 
 
 def _moments(fit: Fit, i: int, j: int) -> tuple[tuple[ComplexArray, ComplexArray], tuple[ComplexArray, ComplexArray]]:
-    """S_0 and S_1 (n,) of two imposed poles of one reference about their middle, and their derivatives (n, z) by the complex unknowns, the middle held."""
+    """S_0 and S_1 (n,) of two imposed poles of one reference about their middle, and their
+    derivatives (n, z) by the complex unknowns, the middle held."""
     (u, by_u), (v, by_v), middle = _shape(fit, i), _shape(fit, j), (fit.poles[i] + fit.poles[j]) / 2
     by_first = (fit.poles[i] - middle) * by_u + (fit.poles[j] - middle) * by_v
     by_first[:, i] += u
@@ -98,7 +104,8 @@ def _moments(fit: Fit, i: int, j: int) -> tuple[tuple[ComplexArray, ComplexArray
 
 
 def _unlike(u: ComplexArray, v: ComplexArray, by_u: ComplexArray, by_v: ComplexArray, covariance: Array) -> float:
-    """Wald's statistic (Trans. Amer. Math. Soc. 54 (1943) 426) of v - c u at the c that makes it least, of vectors (n,) with derivatives (n, z) by the unknowns."""
+    """Wald's statistic (Trans. Amer. Math. Soc. 54 (1943) 426) of v - c u at the c that makes it
+    least, of vectors (n,) with derivatives (n, z) by the unknowns."""
     ways, w = np.array([np.append(u.real, u.imag), np.append(-u.imag, u.real)]).T, np.append(v.real, v.imag)  # what Re c and Im c make of u
     c, told = np.linalg.lstsq(ways, w, rcond=None)[0], np.inf
     for _ in range(ROUNDS):

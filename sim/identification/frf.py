@@ -28,7 +28,8 @@ POWER = {"receptance": -1, "mobility": 0, "accelerance": 1}
 class Frf:
     """The FRFs of one test, motion along each response point's direction over force along each reference point's direction.
 
-    `frf["hub_top0", "seat90"]` or `frf[1, 6]` is one of them, (n,): response and reference by the names or numbers of their nodes. Equal means equal bit for bit. The sign of zeros in `value` is dropped: it means nothing, and UFF readers do not keep it.
+    `frf["hub_top0", "seat90"]` or `frf[1, 6]` is one of them, (n,): response and reference by the names or numbers of their nodes.
+    Equal means equal bit for bit. The sign of zeros in `value` is dropped: it means nothing, and UFF readers do not keep it.
     """
 
     frequency: np.ndarray  # (n,), Hz
@@ -77,7 +78,8 @@ def decibel(value: np.ndarray) -> Array:
 
 
 def even(values: np.ndarray) -> float:
-    """The step of an axis (n,) that rises in even ones; 0 where it does not. Text files and headers round: two percent of a step and six digits are allowed."""
+    """The step of an axis (n,) that rises in even ones; 0 where it does not. Text files and headers
+    round: two percent of a step and six digits are allowed."""
     steps = np.diff(values)
     if len(steps) == 0 or not np.all(np.isfinite(values)):
         return 0.0
@@ -88,13 +90,14 @@ def even(values: np.ndarray) -> float:
 
 
 def record_length(frf: Frf) -> float:
-    """Length (s) of the record that lines so far apart are the discrete Fourier transform of; infinite for lines in uneven steps, which are of a sweep."""
+    """Length (s) of the record that lines so far apart are the discrete Fourier transform of;
+    infinite for lines in uneven steps, which are of a sweep."""
     return 1 / step if (step := even(frf.frequency)) else np.inf
 
 
 def gap(lines: np.ndarray, sweep: bool = True) -> int | None:
-    """The line (n,) before which others are missing, None where none are: a step unlike the others, which in a `sweep` may grow and stay so, but not
-    stand alone among even ones."""
+    """The line (n,) before which others are missing, None where none are: a step unlike the others,
+    which in a `sweep` may grow and stay so, but not stand alone among even ones."""
     steps = np.diff(lines)
     step = np.median(steps)
     uneven = np.abs(steps - step) > 0.02 * step + 1e-5 * lines[1:]  # ASCII abscissae have six digits
@@ -146,8 +149,8 @@ ENOUGH = 16  # lines, from which their scatter tells noise
 REACTIVE, STEP = 0.3, 0.05  # of its imaginary part a mobility's real part between resonances, and its change from line to line
 HUGE = 1e100  # in any unit; squares of what is larger overflow
 SILENT, HEARD = 0.02, 0.1
-"""Of the strongest answer to a hammer: below the first symmetry forbids an answer, and noise alone has no coherence; from the second on a sensor that hears the strongest hears it, and in between coherence
-may be as much lower."""
+"""Of the strongest answer to a hammer: below the first symmetry forbids an answer, and noise alone has no coherence;
+from the second on a sensor that hears the strongest hears it, and in between coherence may be as much lower."""
 DRIFT = 1e-3  # of the same, below which what a record holds may be the drift of its sensor, or rounding: neither knows when the blow was
 
 
@@ -183,8 +186,8 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
 
 
 def _noise(frf: Frf, i: int, j: int) -> np.ndarray:
-    """Noise (n,) of an FRF: its standard errors; where it has none (a single hit), `FLOOR` of the test's largest value, or the scatter of neighbouring
-    lines where that is larger: a receptance of an accelerometer is noise alone at low frequencies."""
+    """Noise (n,) of an FRF: its standard errors; where it has none (a single hit), `FLOOR` of the test's largest value, or the
+    scatter of neighbouring lines where that is larger: a receptance of an accelerometer is noise alone at low frequencies."""
     floor = np.maximum(FLOOR * np.abs(frf.value).max(), scatter(frf.value[i : i + 1, j : j + 1])[0, 0] if len(frf.frequency) > ENOUGH else 0.0)
     sd = np.full(len(frf.frequency), np.inf) if frf.sd is None else frf.sd[i, j]
     return np.where(np.isfinite(sd), sd, floor)
@@ -214,10 +217,10 @@ def _check_coherence(key: str, coherence: np.ndarray, size: np.ndarray, limits: 
 def _check_direction_of_time(key: str, frequency: np.ndarray, value: np.ndarray) -> None:
     """A structure answers after the blow: the impulse response lies at t > 0, a conjugated FRF's at t < 0.
 
-    Needs no resonance of its own at this point and no speed. Left out is |t| below the resolution of the Hann-weighted band,
-    where prompt (mass-like) answers lie. Noise alone, as where symmetry forbids an answer, has half its energy on each side,
-    scattering as 0.6/sqrt(n); the limit is five of these above, so that few lines decide nothing. Lines in uneven steps, as of a logarithmic
-    sweep, are joined by straight ones for this check alone.
+    Needs no resonance of its own at this point and no speed. Left out is |t| below the resolution of the Hann-weighted
+    band, where prompt (mass-like) answers lie. Noise alone, as where symmetry forbids an answer, has half its energy
+    on each side, scattering as 0.6/sqrt(n); the limit is five of these above, so that few lines decide nothing. Lines
+    in uneven steps, as of a logarithmic sweep, are joined by straight ones for this check alone.
     """
     n = len(value)
     if n < 16 or not value.any():
@@ -261,10 +264,12 @@ def _check_driving_point(key: str, frequency: np.ndarray, mobility: np.ndarray, 
 
 
 def _check_susceptance(key: str, frequency: np.ndarray, turned: np.ndarray, noise: np.ndarray, power: int, limits: Limits) -> None:
-    """Away from its resonances the imaginary part of a passive structure's mobility, where it is driven, rises with frequency (Foster, *Bell Syst. Tech. J.* 3 (1924)
-    259): an antiresonance stands between every two resonances. That tells where damping is so light that no line shows power.
+    """Away from its resonances the imaginary part of a passive structure's mobility, where it is
+    driven, rises with frequency (Foster, *Bell Syst. Tech. J.* 3 (1924) 259): an antiresonance stands
+    between every two resonances. That tells where damping is so light that no line shows power.
 
-    `turned` (n,) has a mobility's phase and is one times w^`power`. Steps of a twentieth count, beyond five of their errors, on lines that are reactive and of one sign.
+    `turned` (n,) has a mobility's phase and is one times w^`power`. Steps of a twentieth count,
+    beyond five of their errors, on lines that are reactive and of one sign.
     """
     scale = frequency ** float(power)
     mobility, error = turned * scale, noise * scale

@@ -1,9 +1,9 @@
 """Modes of a measured matrix of frequency response functions, with standard errors.
 
-Nobody clicks: `extract` starts from nothing, adds poles while the likelihood pays for them (`sim.identification.poles`), imposes that the residue matrix
-of a mode has rank one, and takes the errors from the information of everything fitted. All lines and references count, each with
-its own noise. Conventions: H(w) ~ exp(i w t), poles in rad/s with positive imaginary part, R = shape participation^T in receptance,
-standard deviation of a complex number: sd^2 = E|e|^2 (half of it in each of the two parts).
+Nobody clicks: `extract` starts from nothing, adds poles while the likelihood pays for them (`sim.identification.poles`), imposes
+that the residue matrix of a mode has rank one, and takes the errors from the information of everything fitted. All lines and
+references count, each with its own noise. Conventions: H(w) ~ exp(i w t), poles in rad/s with positive imaginary part, R = shape
+participation^T in receptance, standard deviation of a complex number: sd^2 = E|e|^2 (half of it in each of the two parts).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ MOST_LINES = 6400
 STEP, SURE = 0.3, 5.0
 """Of an FRF, from one line to the next, and of its standard errors, from which it changes much."""
 LEAST, FLOOR = 1e-3, 1e-5
-"""Of an FRF, and of the largest to its reference, the noise that it is taken to have at least where none is told: a model's own FRFs have none at all, what modes beyond the band do is a polynomial
-within it to that, and what symmetry forbids is rounding."""
+"""Of an FRF, and of the largest to its reference, the noise that it is taken to have at least where none is told: a model's own
+FRFs have none at all, what modes beyond the band do is a polynomial within it to that, and what symmetry forbids is rounding."""
 FAINT = 4.0
 """A mode is reported if its squared shape, weighted by its information, exceeds this many times what the information criterion asks."""
 
@@ -108,11 +108,11 @@ def extract(
 ) -> Modes:
     """Modes within `band` (Hz, all lines if None) of `frf` (n_resp, n_ref, n) at `frequency` (n,) Hz, with noise `frf_sd` of that shape.
 
-    Without `frf_sd` it is taken from the `scatter` of neighbouring lines, as the status records, as `LEAST` of the FRF and `FLOOR` of the largest to its reference at least. Lines at 0 Hz are left out. Records
-    under an exponential window exp(-window_decay t), 1/s, give H at s = i w + window_decay, and are taken so. Of more than `MOST_LINES` one in so many
-    is taken where FRFs change little. Not reported
-    are modes out of the band or with a damping that is not `BELIEVED`, `FAINT`, or not known better than to their half-width by the fit alone: what enlarges errors beyond that takes none away.
-    Raises ValueError if shapes do not agree or numbers are unusable.
+    Without `frf_sd` it is taken from the `scatter` of neighbouring lines, as the status records, as `LEAST` of the FRF and `FLOOR` of
+    the largest to its reference at least. Lines at 0 Hz are left out. Records under an exponential window exp(-window_decay t), 1/s,
+    give H at s = i w + window_decay, and are taken so. Of more than `MOST_LINES` one in so many is taken where FRFs change little. Not
+    reported are modes out of the band or with a damping that is not `BELIEVED`, `FAINT`, or not known better than to their half-width by
+    the fit alone: what enlarges errors beyond that takes none away. Raises ValueError if shapes do not agree or numbers are unusable.
     """
     frequency, frf = np.asarray(frequency, float), np.asarray(frf, complex)
     if kind not in KINDS:
@@ -137,15 +137,18 @@ def extract(
 
 
 def _alike(lost: float) -> float:
-    """How many times the noise at the start of a record is, in variance, that of its mean, where an exponential window has fallen to exp(-`lost`) at its end: 2 d T / (1 - exp(-2 d T)).
+    """How many times the noise at the start of a record is, in variance, that of its mean, where an
+    exponential window has fallen to exp(-`lost`) at its end: 2 d T / (1 - exp(-2 d T)).
 
-    An answer that dies away at once meets the noise at the start alone, which the mean over all lines takes for so many times less than it is.
+    An answer that dies away at once meets the noise at the start alone, which the mean over all
+    lines takes for so many times less than it is.
     """
     return float(2 * lost / -np.expm1(-2 * lost)) if lost > 0 else 1.0
 
 
 def _telling(frf: ComplexArray, sd: Array, every: int) -> NDArray[np.intp]:
-    """Of lines (n,) one in `every`, and as many as it takes where some FRF changes by more than `STEP` of itself, and by more than its noise, from one to the next."""
+    """Of lines (n,) one in `every`, and as many as it takes where some FRF changes by more than
+    `STEP` of itself, and by more than its noise, from one to the next."""
     if every == 1:
         return np.arange(frf.shape[-1])
     value, error = frf.reshape(-1, frf.shape[-1]).T, SURE * sd.reshape(-1, frf.shape[-1]).T
@@ -170,8 +173,9 @@ def _modes(
 ) -> Modes:
     """Physical units, standard errors, and the choice of what is reported.
 
-    Under an exponential window w the noise at a time goes with w, and the fit weighs it alike: of a mode that decays with a by itself and with b = a + d in the windowed record, an amplitude has
-    `alike` b / (a + 2 d) times the variance that this fit tells, and a pole `alike` (b / (a + 2 d))^3 times, by least squares of exp(-b t), and of t exp(-b t) beside it, in noise that falls as exp(-d t).
+    Under an exponential window w the noise at a time goes with w, and the fit weighs it alike: of a mode that decays with a by itself
+    and with b = a + d in the windowed record, an amplitude has `alike` b / (a + 2 d) times the variance that this fit tells, and a pole
+    `alike` (b / (a + 2 d))^3 times, by least squares of exp(-b t), and of t exp(-b t) beside it, in noise that falls as exp(-d t).
     """
     responses, references = functions
     a, width = fit.shape.shape

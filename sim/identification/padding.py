@@ -1,7 +1,8 @@
-"""Records that were filled up with zeros before their transform: their lines lie closer than those of the records, and say the same several times.
+"""Records that were filled up with zeros before their transform: their lines lie closer than those
+of the records, and say the same several times.
 
-The inverse transform of a band of lines has the record in it, noise and all, up to where the zeros begin: there it falls by all that the taper of the band's ends does not leak
-(Harris, *Proc. IEEE* 66 (1978) 51). An answer that dies away falls as well, but steadily.
+The inverse transform of a band of lines has the record in it, noise and all, up to where the zeros begin: there it falls by all that
+the taper of the band's ends does not leak (Harris, *Proc. IEEE* 66 (1978) 51). An answer that dies away falls as well, but steadily.
 """
 
 from __future__ import annotations

@@ -4,11 +4,11 @@ Let a and b be modes with frequencies f and shapes phi. A pair costs
 
     1 - MAC(phi_a, phi_b)  +  (1 - S) / 2  +  |ln(f_b / f_a) / width|^power  +  a penalty for another kind,
 
-and all pairs are chosen at once, so that their total cost, plus `alone` for every two modes that stay alone, is least (an assignment
-problem). S, the likeness of subspaces, counts only where a policy has a `mixing` distance: modes closer than that turn within the space
-they span with the least change of the structure, so that no single shape of a close pair can be trusted. A `Policy` holds these numbers;
-who needs others makes another one, with the reason beside it. Where shapes at few points are alike, what all other pairs share decides between a paired
-mode and one without a partner (`by_common`).
+and all pairs are chosen at once, so that their total cost, plus `alone` for every two modes that stay alone, is least (an
+assignment problem). S, the likeness of subspaces, counts only where a policy has a `mixing` distance: modes closer than
+that turn within the space they span with the least change of the structure, so that no single shape of a close pair can
+be trusted. A `Policy` holds these numbers; who needs others makes another one, with the reason beside it. Where shapes at
+few points are alike, what all other pairs share decides between a paired mode and one without a partner (`by_common`).
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ MIXING = 0.03
 """Relative distance of two modes below which they turn in their plane at the slightest asymmetry, so that no shape of one alone is trusted."""
 
 FOLLOWED_BY_KIND = Policy(width=0.1, other_kind=np.inf, alone=4.0)
-"""Modes of one model from one step to the next: modes that cross keep their shapes, and what is axial stays axial; and a mode of bearings that lose contact ends there: from one step to the
-next no mode moves by a sixth and changes its shape."""
+"""Modes of one model from one step to the next: modes that cross keep their shapes, and what is axial stays axial; and a
+mode of bearings that lose contact ends there: from one step to the next no mode moves by a sixth and changes its shape."""
 BY_SHAPE = Policy(width=1.0, alone=1.0, mixing=MIXING)
-"""Modes of one model at conditions or of parameters far apart, which may move anywhere: likeness of shape decides, a MAC of a third at least where frequencies agree
-(0.44 of one that moves by half), and what is like none has no partner."""
+"""Modes of one model at conditions or of parameters far apart, which may move anywhere: likeness of shape decides, a
+MAC of a third at least where frequencies agree (0.44 of one that moves by half), and what is like none has no partner."""
 IDENTIFIED = Policy(width=0.02, limit=0.02)
 """Modes identified in a virtual test, and those of the model that was tested: they differ by the identification's error only."""
 MEASURED = Policy(width=0.3, alone=1.25, mixing=MIXING)
@@ -67,14 +67,15 @@ NEAREST = Policy(width=1.0, power=1)
 """Modes known by their frequencies alone: as many as there are, at the least sum of distances."""
 
 OF_A_TABLE = Policy(width=1.0, kind=9.0)
-"""Modes of a table, whose shapes nobody told, and those of a model that fits it: squares, for two modes of a kind on one side of two measured ones cost
-the same either way in absolute differences, and would swap at random."""
+"""Modes of a table, whose shapes nobody told, and those of a model that fits it: squares, for two modes of a
+kind on one side of two measured ones cost the same either way in absolute differences, and would swap at random."""
 
 OF_SHAPES = Policy(width=1.0, mixing=MIXING)
 """The same where the table tells shapes: of modes that these do not part, the nearest."""
 
 SHIFT, STRENGTH = 0.01, float(np.log(3))
-"""Standard deviations of ln frequency and ln strength about what all pairs share, at least: a model that is right but for what all modes share."""
+"""Standard deviations of ln frequency and ln strength about what all pairs share, at least: a model
+that is right but for what all modes share."""
 SHARED = 3
 """Other pairs, at least, that tell what all share."""
 CLEARLY = 4.0
@@ -83,8 +84,8 @@ CLEARLY = 4.0
 
 @dataclass(frozen=True, eq=False)
 class ModeSet:
-    """Modes of one condition. m modes at n places: `frequency` (m,) Hz, `shape` (m, n) or None, `kind` (m,) or none known, `strength` (m,) the
-    largest residue of the mobility or None."""
+    """Modes of one condition. m modes at n places: `frequency` (m,) Hz, `shape` (m, n) or None,
+    `kind` (m,) or none known, `strength` (m,) the largest residue of the mobility or None."""
 
     frequency: Array
     shape: ComplexArray | None = None
@@ -93,8 +94,8 @@ class ModeSet:
 
 
 def at_shared(a: ModeSet, b: ModeSet, nodes: Sequence[int], others: Sequence[int]) -> tuple[ModeSet, ModeSet]:
-    """Two sets whose shapes are at points of their own, `nodes` (n,) of `a` and `others` of `b` (their first columns): with those at the points that both have, in one order, and without
-    any where there are none. As they are where neither tells its points."""
+    """Two sets whose shapes are at points of their own, `nodes` (n,) of `a` and `others` of `b` (their first columns): with those
+    at the points that both have, in one order, and without any where there are none. As they are where neither tells its points."""
     if tuple(nodes) == tuple(others):
         return a, b
     both = [n for n in nodes if n in others]
@@ -166,12 +167,14 @@ def pairs(a: ModeSet, b: ModeSet, policy: Policy) -> NDArray[np.intp]:
 
 
 def by_common(paired: NDArray[np.intp], a: ModeSet, b: ModeSet, policy: Policy) -> NDArray[np.intp]:
-    """Pairs (p, 2), in place of each that lies far from what all others share a nearer one of its mode of `a` or `b` with one of like shape that has no partner.
+    """Pairs (p, 2), in place of each that lies far from what all others share a nearer one of its
+    mode of `a` or `b` with one of like shape that has no partner.
 
-    Of a pair u = ln(f_b / f_a), and the same of the strengths where both sets have them: an error of stiffness or mass moves all modes alike, another unit makes all
-    stronger, and a pole of a disturbance or of the noise is weak and stands anywhere. Far is the sum of the squares of (u - median) / s, s = 1.48 times the median
-    deviation of the other pairs, at least `SHIFT` and `STRENGTH` (Huber, *Robust Statistics*, 1981, 5.1). Alike are shapes whose cost differs by no more than
-    `alike`, as those of a bar that is measured at one end. No partner is one whose u in frequency is more than `width` from the median.
+    Of a pair u = ln(f_b / f_a), and the same of the strengths where both sets have them: an error of stiffness or mass moves
+    all modes alike, another unit makes all stronger, and a pole of a disturbance or of the noise is weak and stands anywhere.
+    Far is the sum of the squares of (u - median) / s, s = 1.48 times the median deviation of the other pairs, at least `SHIFT`
+    and `STRENGTH` (Huber, *Robust Statistics*, 1981, 5.1). Alike are shapes whose cost differs by no more than `alike`, as
+    those of a bar that is measured at one end. No partner is one whose u in frequency is more than `width` from the median.
     """
     unlike, found = _unlike(a, b, policy), [(int(i), int(j)) for i, j in paired]
     told = [(np.log(a.frequency), np.log(b.frequency), SHIFT)]

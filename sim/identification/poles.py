@@ -5,9 +5,10 @@ Anal. 10 (1973) 413; Inverse Problems 19 (2003) R1, in Kaufman's form, BIT 15 (1
 
     H(s) = s^k ( sum_r [ R_r / (s - l_r) + conj(R_r) / (s - conj(l_r)) ]  +  u_-2 / s^2 + u_-1 / s + u_0 + ... + u_4 s^4 ),   s = i w,
 
-k = 0, 1, 2 for receptance, mobility, accelerance; u are real and stand for what lies far outside the band. ComplexArray noise e of every line
-is independent with E|e|^2 = sd^2; under an exponential window neighbouring lines share theirs, so that what noise alone takes off chi-square is up to `alike` times as much. Within the matrix, R_r = shape_r participation_r^T where this is imposed (any mode of a linear system
-that is not a multiple root, gyroscopic or not: Peeters et al., Shock and Vibration 11 (2004) 395), otherwise free.
+k = 0, 1, 2 for receptance, mobility, accelerance; u are real and stand for what lies far outside the band. ComplexArray noise e of
+every line is independent with E|e|^2 = sd^2; under an exponential window neighbouring lines share theirs, so that what noise alone
+takes off chi-square is up to `alike` times as much. Within the matrix, R_r = shape_r participation_r^T where this is imposed (any mode
+of a linear system that is not a multiple root, gyroscopic or not: Peeters et al., Shock and Vibration 11 (2004) 395), otherwise free.
 
 Poles are added and dropped by the Bayesian information criterion (Schwarz, Ann. Stat. 6 (1978) 461). Candidates come from the residual
 itself (matching pursuit). A polynomial fit of high order (pLSCF, Peeters et al. 2004) or AAA (Nakatsukasa et al., SIAM J. Sci. Comput. 40
@@ -47,7 +48,8 @@ APART = 5
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """A measured matrix: s (n,) = i w (plus an exponential window's decay), `frf` (n_resp, n_ref, n), `weight` sqrt(2)/sd, `power` k; `alike` as many lines as share the noise of one."""
+    """A measured matrix: s (n,) = i w (plus an exponential window's decay), `frf` (n_resp, n_ref,
+    n), `weight` sqrt(2)/sd, `power` k; `alike` as many lines as share the noise of one."""
 
     s: ComplexArray
     frf: ComplexArray
@@ -65,9 +67,10 @@ class Lines:
 class Fit:
     """The best linear unknowns for given poles.
 
-    `shape` (a, n_resp) and `participation` (a, n_ref) belong to the first a poles, whose residues are imposed; `residues` (m, F), F the
-    n_resp x n_ref functions in a row; `residual` (F, n) divided by its standard deviation; `gram` (F, q, q) weighted products of the
-    q basis functions [Re R, Im R, smooth, and the derivatives to the poles]; `inverse` that of its free part. The last `faint` ones of those imposed are there for the sake of the others alone.
+    `shape` (a, n_resp) and `participation` (a, n_ref) belong to the first a poles, whose residues are imposed;
+    `residues` (m, F), F the n_resp x n_ref functions in a row; `residual` (F, n) divided by its standard deviation;
+    `gram` (F, q, q) weighted products of the q basis functions [Re R, Im R, smooth, and the derivatives to the poles];
+    `inverse` that of its free part. The last `faint` ones of those imposed are there for the sake of the others alone.
     """
 
     poles: ComplexArray

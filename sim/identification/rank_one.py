@@ -1,4 +1,5 @@
-"""Modes from poles with free residues: the residue matrix of a mode has rank one, two poles at one place with one shape are one mode, and what is too weak to be worth free residues still counts."""
+"""Modes from poles with free residues: the residue matrix of a mode has rank one, two poles at one
+place with one shape are one mode, and what is too weak to be worth free residues still counts."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ SURELY = 5.0
 DOUBTED = 10.0
 """Times what is by noise, up to which what is told of a pole, to second order, is tried."""
 MOST_FAINT, SOON = 10, 0.1
-"""Poles that free residues had been too dear for, and the fall of chi-square at which one is refined: overlapping ones give way along a flat valley."""
+"""Poles that free residues had been too dear for, and the fall of chi-square at which one is
+refined: overlapping ones give way along a flat valley."""
 
 
 def accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, float, list[tuple[complex, complex]]]:
@@ -49,13 +51,13 @@ def accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, float, list[tuple[co
 
 
 def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
-    """The fit with R = shape participation^T for the believed poles in the band, and its strain: the rise of chi-square over what the constraints
-    alone cost, one where they cost no more; zero where the data refuse them.
+    """The fit with R = shape participation^T for the believed poles in the band, and its strain: the rise of
+    chi-square over what the constraints alone cost, one where they cost no more; zero where the data refuse them.
 
-    They are taken as they are, and made `whole`, if chi-square rises by no more than five standard deviations over their number. If not, poles whose residues are far
-    from rank one are tried as two modes at nearly one place each. What then still rises more may be what modes beyond the band leave: where the
-    information criterion prefers rank one nevertheless it stands, strained, and errors are enlarged by the strain's root. Else residues stay free:
-    every function is a response of its own to one reference.
+    They are taken as they are, and made `whole`, if chi-square rises by no more than five standard deviations over their number.
+    If not, poles whose residues are far from rank one are tried as two modes at nearly one place each. What then still rises more
+    may be what modes beyond the band leave: where the information criterion prefers rank one nevertheless it stands, strained, and
+    errors are enlarged by the strain's root. Else residues stay free: every function is a response of its own to one reference.
     """
     responses, references, n = lines.frf.shape
     first = believed(lines, free.poles)
@@ -82,7 +84,8 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
 
 
 def _joined(lines: Lines, fit: Fit) -> Fit | None:
-    """Two poles of rank one at one place with one shape as one, and all refined: free residues of overlapping modes are mixed, and one of them was split that is no two. None where two are there still."""
+    """Two poles of rank one at one place with one shape as one, and all refined: free residues of
+    overlapping modes are mixed, and one of them was split that is no two. None where two are there still."""
     for last in (False, True):
         pairs = np.argwhere(one_shape(lines, fit, same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95)))
         if not len(pairs):
@@ -100,11 +103,13 @@ def _joined(lines: Lines, fit: Fit) -> Fit | None:
 def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
     """One pole instead of two at one place with one shape; and for each such pair the pole kept and how far its place is spread.
 
-    Such a pair is one mode that was not the same in all functions: it moved between the references, or is not linear. The spread is
-    the standard deviation of two places that have the weights of their residues. Of one reference it is the root of what their second moment may be, to a standard error, where that is
-    not `PARTED` from nothing. Where one pole, refined alone, does as well, the second was no more than a step of the search, and nothing is spread.
+    Such a pair is one mode that was not the same in all functions: it moved between the references, or is not linear.
+    The spread is the standard deviation of two places that have the weights of their residues. Of one reference it is
+    the root of what their second moment may be, to a standard error, where that is not `PARTED` from nothing. Where
+    one pole, refined alone, does as well, the second was no more than a step of the search, and nothing is spread.
 
-    Of one sensor and several hammers a mode that moved between these and two that each excites otherwise are the same numbers; they are taken for the first.
+    Of one sensor and several hammers a mode that moved between these and two that each excites
+    otherwise are the same numbers; they are taken for the first.
     """
     alone = lines.frf.shape[1] == 1  # any residues are of rank one, and shapes
     spread: list[tuple[complex, complex]] = []
@@ -153,9 +158,11 @@ def whole(lines: Lines, fit: Fit) -> Fit:
 
 
 def completed(lines: Lines, fit: Fit) -> Fit:
-    """With poles more that chi-square tells of, each with a residue of rank one, of which free residues had been too dear: left out, faint modes bend what overlapping ones tell of themselves.
+    """With poles more that chi-square tells of, each with a residue of rank one, of which free
+    residues had been too dear: left out, faint modes bend what overlapping ones tell of themselves.
 
-    On a machine-tool spindle at 6000 rpm the three within 45 Hz were off by up to eleven of their standard errors for them. One stays where chi-square falls by more than is `by_noise`.
+    On a machine-tool spindle at 6000 rpm the three within 45 Hz were off by up to eleven of their
+    standard errors for them. One stays where chi-square falls by more than is `by_noise`.
     """
     responses, references, _ = lines.frf.shape
     grid, told, least = trial_poles(lines), len(fit.shape), by_noise(lines, 2 * (responses + references))
@@ -173,7 +180,8 @@ def completed(lines: Lines, fit: Fit) -> Fit:
 
 
 def without_idle(lines: Lines, fit: Fit) -> Fit:
-    """Without the poles of rank one that chi-square tells nothing of: what they had stood in for is told by those that complete the fit, which were asked already."""
+    """Without the poles of rank one that chi-square tells nothing of: what they had stood in for is
+    told by those that complete the fit, which were asked already."""
     least = by_noise(lines, 2 * sum(lines.frf.shape[:2]))
     while len(fit.shape) > fit.faint + 1:
         told = _told_of(lines, fit)[: len(fit.shape) - fit.faint]

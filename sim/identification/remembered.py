@@ -1,4 +1,5 @@
-"""Modes of FRFs that were extracted before: kept on disk (`model.files.kept`), a file a test, under the hash of all that `extract` is given.
+"""Modes of FRFs that were extracted before: kept on disk (`model.files.kept`), a file a test, under
+the hash of all that `extract` is given.
 
 A measurement is looked at many times, by `compare`, `ladder` and `workbench`, and its extraction is the longest step of opening it.
 """

@@ -1,9 +1,11 @@
-"""Lines of the running speed in measured FRFs: on a turning spindle the motion of unbalance and races stands beside the answer to the hammer.
+"""Lines of the running speed in measured FRFs: on a turning spindle the motion of unbalance and
+races stands beside the answer to the hammer.
 
-At whole multiples of the turning frequency a line or two stick out of FRFs that are smooth there otherwise. What is smooth is told from the lines on either
-side, as a polynomial and as a ratio of polynomials with one denominator for all FRFs, which follows a resonance (the local rational method: Geerardyn,
-Lataire, Schoukens & Pintelon, *IEEE Trans. Instrum. Meas.* 63 (2014) 1203). A line sticks out if it is beyond the scatter of its neighbours about both.
-At the very ends of a band there are none on one side: where multiples stick out elsewhere, those there are left out unseen.
+At whole multiples of the turning frequency a line or two stick out of FRFs that are smooth there otherwise. What is
+smooth is told from the lines on either side, as a polynomial and as a ratio of polynomials with one denominator for
+all FRFs, which follows a resonance (the local rational method: Geerardyn, Lataire, Schoukens & Pintelon, *IEEE Trans.
+Instrum. Meas.* 63 (2014) 1203). A line sticks out if it is beyond the scatter of its neighbours about both. At the
+very ends of a band there are none on one side: where multiples stick out elsewhere, those there are left out unseen.
 """
 
 from __future__ import annotations
@@ -51,8 +53,8 @@ class RunningLines:
 
 
 def running_lines(frequency: Array, value: ComplexArray, speed: float) -> RunningLines:
-    """The lines at multiples of `speed` (rad/s) that stick out of FRFs `value` (responses, references, n) at `frequency` (n,) Hz; none at rest, or where
-    lines are too few to tell."""
+    """The lines at multiples of `speed` (rad/s) that stick out of FRFs `value` (responses,
+    references, n) at `frequency` (n,) Hz; none at rest, or where lines are too few to tell."""
     turning = abs(speed) / (2 * np.pi)
     out = np.zeros(len(frequency), bool)
     none = RunningLines(out, (), ())
@@ -103,10 +105,11 @@ def _chance(value: ComplexArray, j: int, suspect: NDArray[np.bool_], limit: floa
 
 
 def _tail(here: ComplexArray, at: ComplexArray, x: Array, poles: int) -> Array:
-    """By FRF (rows of `here`) the probability (F distribution) of `at`, the value at x = 0, by what `here` leaves of polynomials over one denominator
-    1 + d_1 x + ... of all FRFs.
+    """By FRF (rows of `here`) the probability (F distribution) of `at`, the value at x = 0, by what
+    `here` leaves of polynomials over one denominator 1 + d_1 x + ... of all FRFs.
 
-    Numerators and denominator by linear least squares, weighted anew with the denominator found (Sanathanan & Koerner 1963): the errors of both count.
+    Numerators and denominator by linear least squares, weighted anew with the denominator found
+    (Sanathanan & Koerner 1963): the errors of both count.
     """
     powers = np.vander(x, DEGREE + 1, increasing=True)
     below, d, of_d = np.ones(len(x), complex), np.zeros(0, complex), np.zeros((0, 0), complex)

@@ -32,7 +32,8 @@ SHORT = 1e-4  # s, to which the length that all hits have is told
 def read(
     files: Sequence[Path], form: MappingForm, scene: Spindle | None, mapping: Path | None = None, progress: Callable[[str], None] = lambda done: None
 ) -> Read:
-    """Read every file as the mapping (`form`, of the file `mapping`) says; what it does not say is among the questions. Raises `BadInput` for damaged files."""
+    """Read every file as the mapping (`form`, of the file `mapping`) says; what it does not say is
+    among the questions. Raises `BadInput` for damaged files."""
     check_files(files, form, mapping)
     settings = {f: settings_of(form, f) for f in files}
     contents = []
@@ -104,7 +105,8 @@ def _turned(curve: Curve, settings: FileForm) -> Curve:
 
 
 def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Sequence[Path], mapping: Path | None) -> tuple[Campaign, list[str]]:
-    """The campaign of all files, and what was done to them. Raises `Unanswered` with all that is open, `BadInput` for FRFs that no structure has."""
+    """The campaign of all files, and what was done to them. Raises `Unanswered` with all that is
+    open, `BadInput` for FRFs that no structure has."""
     check_tests(found, files)
     if found.questions:
         raise unanswered(spoken(found, files), f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in")

@@ -1,4 +1,5 @@
-"""What the names of files seem to tell: temperature, speed, the point that was hit, and which files are one test. Proposals, for a person to check."""
+"""What the names of files seem to tell: temperature, speed, the point that was hit, and which files
+are one test. Proposals, for a person to check."""
 
 from __future__ import annotations
 
@@ -39,8 +40,8 @@ def hit_at(file: Path) -> int | None:
 
 
 def tests_of(contents: Sequence[Content]) -> dict[Path, str]:
-    """The test that each file seems to be of: files whose names differ by the hammer's point, the response or the hit alone are one, unless they hold
-    the same FRF twice."""
+    """The test that each file seems to be of: files whose names differ by the hammer's point, the
+    response or the hit alone are one, unless they hold the same FRF twice."""
     groups: dict[str, list[Content]] = {}
     for c in contents:
         groups.setdefault(plain(PART.sub("", HAMMER.sub("", c.file.stem))), []).append(c)

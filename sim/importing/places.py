@@ -44,7 +44,8 @@ APART = 1.0 * MM
 
 
 def shared(form: MappingForm, scene: Spindle) -> list[int]:
-    """Nodes that a mapping tells with body and place, and the scene has too: where none of `misfits` is about them, it is of the same machine."""
+    """Nodes that a mapping tells with body and place, and the scene has too: where none of
+    `misfits` is about them, it is of the same machine."""
     own = {p.node for p in scene.points}
     return [p.node for p in form.points if p.node in own and p.body is not None and p.position_mm is not None]
 

@@ -1,8 +1,10 @@
-"""Crossings of a line and a mode between two neighbours of the grid, interpolated: for spindles with more of them than can be found one by one.
+"""Crossings of a line and a mode between two neighbours of the grid, interpolated: for spindles
+with more of them than can be found one by one.
 
-Place and frequency come from the polynomial through the four nearest points of the grid. Strengths are those of the line on the mode at both
-neighbours, each at its own resonance, interpolated linearly. Runout is that of all lines at the nearer neighbour, line by line with their frequencies and
-the pole of the mode moved to the crossing; a map computes it where its curves of runout pass. What this is worth is seen where crossings are also found exactly (`found.Interpolated`).
+Place and frequency come from the polynomial through the four nearest points of the grid. Strengths are those of the line
+on the mode at both neighbours, each at its own resonance, interpolated linearly. Runout is that of all lines at the
+nearer neighbour, line by line with their frequencies and the pole of the mode moved to the crossing; a map computes it
+where its curves of runout pass. What this is worth is seen where crossings are also found exactly (`found.Interpolated`).
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ POINTS = 4
 
 
 def passes_zero(gap: Array) -> NDArray[np.bool_]:
-    """Whether a gap (..., n) passes zero from each place to the next, (..., n - 1); one that stands on zero at a place does so on the way to it, once."""
+    """Whether a gap (..., n) passes zero from each place to the next, (..., n - 1); one that stands
+    on zero at a place does so on the way to it, once."""
     before, after = gap[..., :-1], gap[..., 1:]
     return (before * after < 0) | ((after == 0) & (np.abs(before) > 0))
 

@@ -23,9 +23,10 @@ SENSE = 0.01
 class Critical:
     """A mode near the speed (rad/s, with its sign) of parts that turn together.
 
-    `sense`: share of the modal forces of unbalances all along the parts that their own sense of whirl has, |psi f|^2 of |psi f|^2 + |psi f*|^2 (1: a mode that whirls with them,
-    1/2: a standing one); `moved` (m, long half axis): how far `unbalance` (kg m) at the height `z` (m) moves its place in that mode alone, at resonance, inf of an undamped one;
-    `of_scene`: the unbalance is the scene's, else `UNIT_UNBALANCE` where it does most.
+    `sense`: share of the modal forces of unbalances all along the parts that their own sense of whirl has, |psi
+    f|^2 of |psi f|^2 + |psi f*|^2 (1: a mode that whirls with them, 1/2: a standing one); `moved` (m, long half
+    axis): how far `unbalance` (kg m) at the height `z` (m) moves its place in that mode alone, at resonance,
+    inf of an undamped one; `of_scene`: the unbalance is the scene's, else `UNIT_UNBALANCE` where it does most.
     """
 
     parts: tuple[str, ...]

@@ -20,7 +20,8 @@ NEARBY = 0.1  # of a speed, how far beyond those that are asked for crossings ar
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A mode over the grid: its number, kind, whirl and damping ratio at the nominal condition, `frequency` (T, S) in Hz, NaN where it was lost."""
+    """A mode over the grid: its number, kind, whirl and damping ratio at the nominal condition,
+    `frequency` (T, S) in Hz, NaN where it was lost."""
 
     number: int
     kind: str
@@ -42,10 +43,10 @@ class LineTrack:
 class Coincidence:
     """A line meets a mode at a condition.
 
-    `sense`: share of the modal force that its sense of whirl has (1: all, 1/2: a standing mode); `strength` (m, zero to peak) at the
-    hub's probe under the map's imperfections, zero where they do not make this line; `unit_strength` (m) for 1 um of wave or ball size or 1 g mm;
-    `margin`: (line - mode) / mode at the nominal condition; `nrro` (m rms) of all nonrepeatable lines there, in the mode's direction;
-    `at_nominal_speed`: found along temperature at the nominal speed, else along speed.
+    `sense`: share of the modal force that its sense of whirl has (1: all, 1/2: a standing mode); `strength` (m, zero to peak)
+    at the hub's probe under the map's imperfections, zero where they do not make this line; `unit_strength` (m) for 1 um of
+    wave or ball size or 1 g mm; `margin`: (line - mode) / mode at the nominal condition; `nrro` (m rms) of all nonrepeatable
+    lines there, in the mode's direction; `at_nominal_speed`: found along temperature at the nominal speed, else along speed.
     """
 
     line: Line
@@ -71,8 +72,8 @@ class Coincidence:
 
 @dataclass(frozen=True, eq=False)
 class Interpolated:
-    """How many crossings stand as interpolated (`sim.resonance.between`), and what that is worth where `checked` others were also found exactly:
-    largest error in frequency (relative), and of strengths the median and the largest (relative)."""
+    """How many crossings stand as interpolated (`sim.resonance.between`), and what that is worth where `checked` others
+    were also found exactly: largest error in frequency (relative), and of strengths the median and the largest (relative)."""
 
     crossings: int
     checked: int
@@ -95,9 +96,10 @@ class Curve:
 class ResonanceMap:
     """Natural frequencies and lines on the grid `temperatures` (C) x `speeds` (rad/s), and where they meet.
 
-    `nrro_speed`, `nrro_temperature` (n, 3): place (rad/s or C), radial and axial rms (m), along speed at the nominal temperature and along
-    temperature at the nominal speed, with every coincidence there that was found exactly and denser about the strongest. `beyond`: what is met within `NEARBY` outside the
-    speeds at the nominal temperature, strongest first, where that was asked. `drawn_from` is the seed of imperfections that the scene does not name, None if it does.
+    `nrro_speed`, `nrro_temperature` (n, 3): place (rad/s or C), radial and axial rms (m), along speed at the nominal
+    temperature and along temperature at the nominal speed, with every coincidence there that was found exactly and denser
+    about the strongest. `beyond`: what is met within `NEARBY` outside the speeds at the nominal temperature, strongest
+    first, where that was asked. `drawn_from` is the seed of imperfections that the scene does not name, None if it does.
     """
 
     spindle: Spindle
@@ -136,13 +138,15 @@ def strongest(coincidences: Sequence[Coincidence]) -> list[Coincidence]:
 
 
 def nearest(coincidences: Sequence[Coincidence]) -> Coincidence | None:
-    """The one whose line is nearest to its mode at the nominal condition, of those that the map's imperfections excite if they excite any; None of none."""
+    """The one whose line is nearest to its mode at the nominal condition, of those that the map's
+    imperfections excite if they excite any; None of none."""
     excited = [c for c in coincidences if c.strength > 0] or list(coincidences)
     return min(excited, key=lambda c: abs(c.margin), default=None)
 
 
 def once(coincidences: Sequence[Coincidence]) -> list[Coincidence]:
-    """Without those along speed that one at the nominal speed is already: a crossing of a line and a mode close to the nominal condition is met along both axes."""
+    """Without those along speed that one at the nominal speed is already: a crossing of a line and
+    a mode close to the nominal condition is met along both axes."""
     nominal: dict[tuple, list[Condition]] = {}
     for c in coincidences:
         if c.at_nominal_speed:

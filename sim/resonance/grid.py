@@ -1,4 +1,5 @@
-"""The grid of a resonance map: conditions of one spindle with their modes followed from one to the next, and the crossings of lines and modes between its places, and just beyond them."""
+"""The grid of a resonance map: conditions of one spindle with their modes followed from one to the
+next, and the crossings of lines and modes between its places, and just beyond them."""
 
 from __future__ import annotations
 
@@ -35,8 +36,8 @@ PARTS = 20  # of many crossings, after each of which progress is told
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A change of sign of line less mode between two neighbours of the grid, `ends` with that difference (Hz) at each; `between` is the crossing as
-    interpolated."""
+    """A change of sign of line less mode between two neighbours of the grid, `ends` with that
+    difference (Hz) at each; `between` is the crossing as interpolated."""
 
     line: LineTrack
     track: Track
@@ -163,8 +164,8 @@ class Grid:
         return found
 
     def met(self, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> tuple[dict[int, Coincidence], Interpolated | None]:
-        """The coincidences, by the identity of their candidates. A spindle of rigid bodies has each found exactly; of a flexible one with more than
-        `EXACT` candidates only so many strongest are, and the others stand as interpolated."""
+        """The coincidences, by the identity of their candidates. A spindle of rigid bodies has each found exactly; of a
+        flexible one with more than `EXACT` candidates only so many strongest are, and the others stand as interpolated."""
         flexible = len(next(iter(self.kept.values())).point.chain.dofs) > LARGE
         rough: dict[int, Coincidence] = {}
         chosen = list(candidates)
@@ -233,8 +234,8 @@ class Grid:
         return Coincidence(line, track, condition, line.frequency, mode.frequency, sense, strength, unit, c.margin, nrro, c.at_nominal_speed, ratio=self.ratio)
 
     def beyond(self, tracks: Sequence[Track], of_lines: Sequence[LineTrack], over_s: Array, nominal: tuple[int, int]) -> tuple[Coincidence, ...]:
-        """What is met within `NEARBY` outside the speeds at the nominal temperature, strongest first, of which the first few are found exactly; nothing where there is no
-        such state."""
+        """What is met within `NEARBY` outside the speeds at the nominal temperature, strongest
+        first, of which the first few are found exactly; nothing where there is no such state."""
         candidates = [c for edge, step in ((len(over_s) - 1, 1), (0, -1)) for c in self._further(tracks, of_lines, over_s, nominal, edge, step)]
         rough = [(c, near) for c in candidates if (near := self.interpolated(c)) is not None]
         rough.sort(key=lambda pair: -pair[1].strength)

@@ -1,9 +1,10 @@
 """Where natural frequencies meet the lines of bearings and unbalance, over temperature and speed: a Campbell diagram with two axes.
 
-Modes are followed by shape over the grid from the nominal condition, along temperature at the nominal speed and from there along speed.
-A line (`model.bearing.kinematics`) crosses a mode where their difference changes sign between neighbours of the grid; the crossing is then found
-with the exact operating point. Of a flexible spindle with hundreds of crossings only the strongest are found so, and the others are interpolated between the
-grid's points (`sim.resonance.between`), with an error that is measured on those found both ways. It counts only where the line can excite the mode:
+Modes are followed by shape over the grid from the nominal condition, along temperature at the nominal speed and from there
+along speed. A line (`model.bearing.kinematics`) crosses a mode where their difference changes sign between neighbours of
+the grid; the crossing is then found with the exact operating point. Of a flexible spindle with hundreds of crossings only
+the strongest are found so, and the others are interpolated between the grid's points (`sim.resonance.between`), with an
+error that is measured on those found both ways. It counts only where the line can excite the mode:
 
 - an axial line an axial mode, a radial line a rocking or lateral one;
 - sense of whirl: of the modal force of a line, |psi f|^2, and of the same line whirling the other way, |psi f*|^2 (psi the left modal
@@ -46,10 +47,12 @@ def resonance_map(
     progress: Callable[[str], None] = lambda done: None,
     nearby: bool = False,
 ) -> ResonanceMap:
-    """The map over `temperatures` (C) and `speeds` (rad/s, not negative), to which the nominal condition is added; with `nearby` also what is met just beyond these speeds.
+    """The map over `temperatures` (C) and `speeds` (rad/s, not negative), to which the nominal
+    condition is added; with `nearby` also what is met just beyond these speeds.
 
-    Modes up to `highest` (Hz, the scene's band by default) at the nominal condition are followed. `imperfections` default to the
-    scene's (with those of its effects), or to a plausible set where it names none. BadInput for speeds without extent; of one temperature it is a Campbell diagram alone.
+    Modes up to `highest` (Hz, the scene's band by default) at the nominal condition are followed.
+    `imperfections` default to the scene's (with those of its effects), or to a plausible set where it
+    names none. BadInput for speeds without extent; of one temperature it is a Campbell diagram alone.
     """
     over_t, over_s = _with(nominal.temperature, temperatures), _with(nominal.speed, speeds)
     if len(over_s) < 2:
@@ -87,7 +90,8 @@ def resonance_map(
 
 
 def _with(nominal: float, values: Sequence[float]) -> Array:
-    """Places of the grid in rising order with the nominal one, once: one that differs from it by rounding alone would be a neighbour that nothing can be interpolated to."""
+    """Places of the grid in rising order with the nominal one, once: one that differs from it by
+    rounding alone would be a neighbour that nothing can be interpolated to."""
     every = np.array(values, float)
     return np.unique([nominal, *every[~np.isclose(every, nominal, rtol=1e-9, atol=1e-9)]])
 
@@ -107,8 +111,8 @@ def _nearest(values: Array, value: float) -> int:
 
 
 def _dense(grid: Array, met: Sequence[Coincidence], place: Callable[[Coincidence], float]) -> list[float]:
-    """The grid, the places of all that is met at the nominal speed or was found exactly, where runout may have a peak that the grid misses, and some values more about those of the
-    `DENSER` strongest, within one step of the grid."""
+    """The grid, the places of all that is met at the nominal speed or was found exactly, where runout may have a peak
+    that the grid misses, and some values more about those of the `DENSER` strongest, within one step of the grid."""
     step = float(np.diff(grid).max(initial=0.0))
     own = [place(c) for c in met if c.at_nominal_speed or not c.interpolated]
     more = [place(c) + share * step for c in strongest(met)[:DENSER] for share in (-0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5)]

@@ -131,7 +131,8 @@ def line_amplitudes(found: Exact) -> dict[Key, float]:
 
 
 def nrro_rms(found: Exact) -> tuple[float, float]:
-    """Radial (mean square of x and y) and axial rms (m) of all lines that are no whole multiple of the speed of what the probes see, from the linear response.
+    """Radial (mean square of x and y) and axial rms (m) of all lines that are no whole multiple of
+    the speed of what the probes see, from the linear response.
 
     Lines of one bearing at equal frequency add up as phasors, others as squares: the cages of two bearings drift against each other.
     """

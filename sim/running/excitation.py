@@ -97,7 +97,8 @@ def at_speed(found: Excitation, ratio: float) -> Harmonics:
 
 
 def response(point: OperatingPoint, forces: Harmonics, known: Callable[[], Poles] | None = None) -> ComplexArray:
-    """Displacement phasors (n, dofs) of the chain under the forces, by the exact linear model at the point's speed, whose poles may be `known`.
+    """Displacement phasors (n, dofs) of the chain under the forces, by the exact linear model at
+    the point's speed, whose poles may be `known`.
 
     q(t) = Re(sum of response exp(2 pi i frequency t)).
     """
@@ -172,8 +173,9 @@ def _unbalance(point: OperatingPoint, own: Imperfections) -> Iterator[tuple[Line
 class Felt:
     """What the balls of a row feel of one wave: each pulls the rings by `pull` (2,) N/m (r, z) times Re(amplitude exp(i rate t)).
 
-    `amplitude` (balls,) m; `rate` (rad/s) in the frame of the cage; `line` names what comes of it (direction, and +1 or -1 for the sense of
-    the rate in which it adds to the cage's). Where it does the same to all balls at once the cage's speed changes with them, and each pulls by `all_pull` along the axis.
+    `amplitude` (balls,) m; `rate` (rad/s) in the frame of the cage; `line` names what comes of it (direction,
+    and +1 or -1 for the sense of the rate in which it adds to the cage's). Where it does the same to all
+    balls at once the cage's speed changes with them, and each pulls by `all_pull` along the axis.
     """
 
     amplitude: ComplexArray

@@ -1,8 +1,8 @@
 """Lines of known frequency in a record: their phasors by least squares, which causes they have, and what no cause explains.
 
-A least-squares fit of sines and cosines at the frequencies that theory names has none of the leakage that the bins of a Fourier transform have, and
-parts lines much closer than a bin. Lines nearer than half a bin are fitted as one, at the middle of the record, where their sum is well known whatever
-their shares; the shares then come from the linear prediction. Across the axis a line is an ellipse, the sum of a
+A least-squares fit of sines and cosines at the frequencies that theory names has none of the leakage that the bins of a Fourier transform
+have, and parts lines much closer than a bin. Lines nearer than half a bin are fitted as one, at the middle of the record, where their sum
+is well known whatever their shares; the shares then come from the linear prediction. Across the axis a line is an ellipse, the sum of a
 forward and a backward circle: z = x + i y = F exp(i w t) + conj(B) exp(-i w t) with F = (X + i Y) / 2 and B = (X - i Y) / 2.
 """
 
@@ -42,10 +42,10 @@ class Fit:
 
 @dataclass(frozen=True)
 class FoundLine:
-    """A line of a record. `amplitude` (m, zero to peak) along the axis or the largest semi-axis of the ellipse across it, `forward` and
-    `backward` the radii of its circles (0 along the axis); `order`: frequency in turning frequencies of the spindle, also where the part that is seen has
-    another, whose revolutions alone `repeatable` goes by; `causes` strongest first by linear theory,
-    with the `shares` (m) it gives them; none for an unexplained line; `predicted` (m): amplitude in linear theory."""
+    """A line of a record. `amplitude` (m, zero to peak) along the axis or the largest semi-axis of the ellipse across it,
+    `forward` and `backward` the radii of its circles (0 along the axis); `order`: frequency in turning frequencies of the spindle,
+    also where the part that is seen has another, whose revolutions alone `repeatable` goes by; `causes` strongest first by linear
+    theory, with the `shares` (m) it gives them; none for an unexplained line; `predicted` (m): amplitude in linear theory."""
 
     frequency: float  # Hz
     order: float
@@ -69,8 +69,8 @@ class FoundLine:
 def fit(time: Array, value: Array, frequency: Array) -> Fit:
     """Least squares of a record (probes, n) at time (n,) s on the mean and lines at `frequency` (k,) Hz, by normal equations.
 
-    ValueError when the frequencies are more than the samples can tell. Directions in which the data say nothing (two frequencies almost the same) are left
-    out: the phasors with the smallest norm.
+    ValueError when the frequencies are more than the samples can tell. Directions in which the data
+    say nothing (two frequencies almost the same) are left out: the phasors with the smallest norm.
     """
     k, n = len(frequency), len(time)
     if 2 * k + 1 > n:
@@ -123,8 +123,8 @@ def groups(frequency: Sequence[float] | Array, near: float) -> list[list[int]]:
 
 
 def amplitude_of(phasor: ComplexArray, sense: float) -> tuple[float, float, float]:
-    """Amplitude, forward and backward radius: of phasors (2,) along x and y the largest semi-axis and the circles' radii, `sense` of turning
-    +-1; of one (1,) along the axis its size, and no radii."""
+    """Amplitude, forward and backward radius: of phasors (2,) along x and y the largest semi-axis and
+    the circles' radii, `sense` of turning +-1; of one (1,) along the axis its size, and no radii."""
     if len(phasor) == 1:
         return float(abs(phasor[0])), 0.0, 0.0
     forward, backward = abs(phasor[0] + 1j * sense * phasor[1]) / 2, abs(phasor[0] - 1j * sense * phasor[1]) / 2
@@ -137,11 +137,13 @@ def amplitude_of(phasor: ComplexArray, sense: float) -> tuple[float, float, floa
 def find_lines(
     time: Array, value: Array, turning: float, known: Sequence[Line], predicted: ComplexArray, seen: Array | None = None
 ) -> tuple[tuple[FoundLine, ...], Fit]:
-    """The lines of a record (probes, n) m at time (n,) s, whose first three probes look along x, y and the axis; strongest first, with the fit.
+    """The lines of a record (probes, n) m at time (n,) s, whose first three probes look along x, y
+    and the axis; strongest first, with the fit.
 
-    `turning` is the turning frequency of the spindle (Hz, signed), `seen` those (Hz) of what probes see, that of the three first, left out the spindle's: its multiples are
-    always looked for, and lines at multiples of the others have exactly that frequency. `known` are the lines of theory, `predicted` their
-    phasors (known, 3) m by linear theory. Lines below a thousandth of the strongest in their direction are left out.
+    `turning` is the turning frequency of the spindle (Hz, signed), `seen` those (Hz) of what probes see, that
+    of the three first, left out the spindle's: its multiples are always looked for, and lines at multiples of
+    the others have exactly that frequency. `known` are the lines of theory, `predicted` their phasors (known,
+    3) m by linear theory. Lines below a thousandth of the strongest in their direction are left out.
     """
     length, rate = float(time[-1] - time[0]) * len(time) / (len(time) - 1), abs(turning)
     seen = np.array([rate]) if seen is None else np.abs(seen)
@@ -198,8 +200,8 @@ def _frequencies(known: Sequence[Line]) -> Array:
 def _told(
     direction: str, frequency: Array, phasor: ComplexArray, near: list[Line], expected: ComplexArray, rates: tuple[float, float], sense: float
 ) -> FoundLine:
-    """One line out of fitted `frequency` (k,) with `phasor` (1 or 2, k), and lines of theory `near` with `expected` (1 or 2, near); `rates` (Hz) of the
-    spindle, which orders are told in, and of the part that is seen, in whose revolutions a line repeats or not."""
+    """One line out of fitted `frequency` (k,) with `phasor` (1 or 2, k), and lines of theory `near` with `expected` (1 or 2, near);
+    `rates` (Hz) of the spindle, which orders are told in, and of the part that is seen, in whose revolutions a line repeats or not."""
     size, forward, backward = amplitude_of(phasor.sum(axis=1), sense)
     main = float(frequency[int(np.abs(phasor).sum(axis=0).argmax())])
     rate, seen = rates

@@ -1,9 +1,9 @@
 """Ball by ball, with the balls moving: the second way to the running spindle, without small amplitudes.
 
-Every ball orbits with its cage, spins, and meets the waves of both races and its own; its Hertz contact pulls with K max(deformation,
-0)^1.5 along the line between the groove centres as they lie at that moment. Stiffness that changes as balls pass, contact loss and all
-products of imperfections and motion are in it; the result of `sim.running.excitation` must come out where amplitudes are small. Nothing of that
-module is used: profiles are added up at each ball, in time.
+Every ball orbits with its cage, spins, and meets the waves of both races and its own; its Hertz contact pulls with K
+max(deformation, 0)^1.5 along the line between the groove centres as they lie at that moment. Stiffness that changes as
+balls pass, contact loss and all products of imperfections and motion are in it; the result of `sim.running.excitation`
+must come out where amplitudes are small. Nothing of that module is used: profiles are added up at each ball, in time.
 
 The damping of a bearing acts on the motion of its rings less that of the loads which the imperfections alone would make, as in the linear
 model. The rest of the chain is linear and is carried over each step exactly (matrix exponential), with the contacts' difference from their

@@ -1,5 +1,6 @@
-"""Probes of a turning spindle, fixed in space, which look at a part of it: across the axis at the side of the hub, and along the axis at its centre, near the top of it, besides the scene's own
-measuring points. The looked-at surface is round and true, so that a probe shows the axis and nothing else.
+"""Probes of a turning spindle, fixed in space, which look at a part of it: across the axis at the side
+of the hub, and along the axis at its centre, near the top of it, besides the scene's own measuring
+points. The looked-at surface is round and true, so that a probe shows the axis and nothing else.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ class Probe:
 
 
 def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
-    """Across the axis along x and y, at the side of the turning body's highest region a tenth of its height below the top, and along the
-    axis, at the centre of its top face. Of a flexible shaft that turns at the scene's first measuring point across the axis on what turns, a tool
-    say, or else its lower end."""
+    """Across the axis along x and y, at the side of the turning body's highest region a tenth of its
+    height below the top, and along the axis, at the centre of its top face. Of a flexible shaft that turns
+    at the scene's first measuring point across the axis on what turns, a tool say, or else its lower end."""
     shaft = next((s for s in spindle.structure.shafts if s.turns), None)
     if shaft is not None:
         body, radius, height = _first_place(spindle, shaft)
@@ -63,7 +64,8 @@ def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
 
 
 def speed_ratio(spindle: Spindle, probe: Probe | Point | None = None) -> float:
-    """Speed of what a probe, by default the hub's, sees over the spindle's: what repeats every revolution goes by it, at what stands by the hub's."""
+    """Speed of what a probe, by default the hub's, sees over the spindle's: what repeats every
+    revolution goes by it, at what stands by the hub's."""
     own = None if probe is None else spindle.structure.body(probe.body)
     if own is None or not own.turns:
         shaft = next((s for s in spindle.structure.shafts if s.turns), None)

@@ -1,15 +1,16 @@
 """A running record cut into whole revolutions: what repeats in every one of them, and what does not.
 
-By averaging, the repeatable runout (RRO) is the mean over the revolutions at every angle, the nonrepeatable runout (NRRO) what is left (Al Mamun, Guo
-& Bi, *Hard Disk Drive: Mechatronics and Control*, 2007, Eqs. 3.83 and 3.84). The two are orthogonal, so that the variances add up:
-var(total) = var(RRO) + var(NRRO), exactly, for any record of whole revolutions (*J. Vib. Acoust.* 113 (1991) 292 has the like in the
-frequency domain). A line at `orders` times the turning frequency leaks into the mean of N revolutions with the gain
-sin(pi N orders) / (N sin(pi orders)), 1 for whole orders: `leakage`. By harmonics, the RRO is the sum of the lines at whole orders (Jang,
-Kim & Han's frequency-domain method, *IEEE Trans. Magn.*, takes the bins of a Fourier transform; `sim.running.lines` fits the lines, which leaves no leakage).
+By averaging, the repeatable runout (RRO) is the mean over the revolutions at every angle, the nonrepeatable runout
+(NRRO) what is left (Al Mamun, Guo & Bi, *Hard Disk Drive: Mechatronics and Control*, 2007, Eqs. 3.83 and 3.84). The two
+are orthogonal, so that the variances add up: var(total) = var(RRO) + var(NRRO), exactly, for any record of whole
+revolutions (*J. Vib. Acoust.* 113 (1991) 292 has the like in the frequency domain). A line at `orders` times the turning
+frequency leaks into the mean of N revolutions with the gain sin(pi N orders) / (N sin(pi orders)), 1 for whole orders:
+`leakage`. By harmonics, the RRO is the sum of the lines at whole orders (Jang, Kim & Han's frequency-domain method,
+*IEEE Trans. Magn.*, takes the bins of a Fourier transform; `sim.running.lines` fits the lines, which leaves no leakage).
 
-Values of error motion follow ISO 230-7:2015, clause 3 (the same as ASME B89.3.4-2010) for a fixed sensitive direction: the
-polar plot is the displacement over the angle of the turning part. Radial plots are centred on their least-squares circle, which takes the part
-once per revolution away (for a workpiece it is how it is centred); along the axis it stays.
+Values of error motion follow ISO 230-7:2015, clause 3 (the same as ASME B89.3.4-2010) for a fixed sensitive direction:
+the polar plot is the displacement over the angle of the turning part. Radial plots are centred on their least-squares
+circle, which takes the part once per revolution away (for a workpiece it is how it is centred); along the axis it stays.
 """
 
 from __future__ import annotations

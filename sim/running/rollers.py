@@ -1,12 +1,13 @@
-"""What cylindrical rollers feel of waves and of their own sizes: free displacements of a roller bearing, as `excitation` has them of a ball row.
+"""What cylindrical rollers feel of waves and of their own sizes: free displacements of a roller
+bearing, as `excitation` has them of a ball row.
 
 Between centred rings every roller is pressed by the same d, so that each has the slope s = c (10/9) d^(1/9) (`model.bearing.roller`), and
 
     K u = sum over rollers of s p (cos, sin, 0, -h sin, h cos),
 
-p what presses the roller at its azimuth beyond the others (m): its own size, both its ends of a wave of its own, the inner race's wave less the
-outer one's; h the height of its row. Waves of a race run straight along it and meet all rows alike; sizes and waves of rollers stand row by row. The
-rows' rollers stand at the same azimuths. Nothing acts along the axis. Loose rollers carry nothing and excite nothing.
+p what presses the roller at its azimuth beyond the others (m): its own size, both its ends of a wave of its own, the inner race's wave less
+the outer one's; h the height of its row. Waves of a race run straight along it and meet all rows alike; sizes and waves of rollers stand
+row by row. The rows' rollers stand at the same azimuths. Nothing acts along the axis. Loose rollers carry nothing and excite nothing.
 """
 
 from __future__ import annotations

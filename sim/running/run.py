@@ -65,7 +65,8 @@ class SpeedProfile:
 class RunningRecord:
     """A spindle that ran: time (n,) s, angle (n,) rad and speed (n,) rad/s of the turning body, displacement (n, dofs) m, rad.
 
-    Angle and speed are the spindle's, of which every turning body has its own ratio. Displacements are those of the chain's degrees of freedom from the loaded state, in a frame that does not turn.
+    Angle and speed are the spindle's, of which every turning body has its own ratio. Displacements
+    are those of the chain's degrees of freedom from the loaded state, in a frame that does not turn.
     """
 
     point: OperatingPoint

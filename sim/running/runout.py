@@ -1,10 +1,11 @@
 """Runout of a turning spindle: what probes at points in space see, what of it repeats, which lines it holds and why.
 
-Signals of `probes` come from a running simulation (`measured`) or, for the steady state of the same condition, from the exact harmonic answer of the
-linear model (`linear`). Both paths show the same; the first also shows what a ball-by-ball bearing adds.
+Signals of `probes` come from a running simulation (`measured`) or, for the steady state of the same condition, from the exact
+harmonic answer of the linear model (`linear`). Both paths show the same; the first also shows what a ball-by-ball bearing adds.
 
-What repeats does so every revolution of the part that a probe sees, which need not turn as the spindle does (`speed_ratio`): its revolutions are counted, and the RRO holds the lines
-at whole multiples of its turning frequency. A probe at what stands goes by the hub. Orders are told in turning frequencies of the spindle always.
+What repeats does so every revolution of the part that a probe sees, which need not turn as the spindle does
+(`speed_ratio`): its revolutions are counted, and the RRO holds the lines at whole multiples of its turning
+frequency. A probe at what stands goes by the hub. Orders are told in turning frequencies of the spindle always.
 
 Quoted as RRO and NRRO are peak to valley values of the record: the more revolutions, the larger the NRRO's, since its lines
 come into step sooner or later, so a value goes with its number of revolutions.
@@ -46,8 +47,8 @@ SAMPLE_RATE = 20000.0  # Hz, ten samples a period of the highest lines of a smal
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """What the probes see: `value` (probes, n) m at `time` (n,) s, when the spindle stands at `angle` (n,) rad, of which parts turn by their ratio, and the whole motion
-    (n, dofs) of the chain from which they see it."""
+    """What the probes see: `value` (probes, n) m at `time` (n,) s, when the spindle stands at `angle` (n,) rad,
+    of which parts turn by their ratio, and the whole motion (n, dofs) of the chain from which they see it."""
 
     probes: tuple[Probe, ...]
     time: Array
@@ -64,7 +65,8 @@ class Signals:
 class Runout:
     """One record of whole revolutions analysed. `lines`: of the hub's three probes, strongest first; `fit`: of all.
 
-    `averaged` and `by_lines` cut the record of every probe into revolutions of what the hub's probes see; `cut_of` into those of what a probe sees itself.
+    `averaged` and `by_lines` cut the record of every probe into revolutions of what the hub's
+    probes see; `cut_of` into those of what a probe sees itself.
     """
 
     point: OperatingPoint
@@ -97,12 +99,14 @@ class Runout:
 
     @cached_property
     def by_lines(self) -> Revolutions:
-        """The same revolutions with the RRO made of the lines at whole orders of what is seen alone, which the other lines do not leak into."""
+        """The same revolutions with the RRO made of the lines at whole orders of what is seen
+        alone, which the other lines do not leak into."""
         return self._from_lines(self.averaged, self.ratios[0])
 
     @cached_property
     def _others(self) -> dict[float, tuple[Revolutions, Revolutions]]:
-        """Averaged and by lines, by the size of the ratio, for what probes see beside the hub that turns at another speed; samples as many as in the hub's."""
+        """Averaged and by lines, by the size of the ratio, for what probes see beside the hub that
+        turns at another speed; samples as many as in the hub's."""
         found = {}
         for ratio in {abs(r) for r in self.ratios} - {abs(self.ratios[0])}:
             cut = revolutions(self.signals.time, ratio * self.signals.angle, self.signals.value, len(self.averaged.angle))
@@ -150,7 +154,8 @@ def linear(point: OperatingPoint, probes: Sequence[Probe], time: Array, excited:
 
 
 def whole_turns(point: OperatingPoint) -> int:
-    """Default number of revolutions, of what the hub's probes see, of a record: between once and twice the shortest record, where the lines leak least into their mean."""
+    """Default number of revolutions, of what the hub's probes see, of a record: between once and
+    twice the shortest record, where the lines leak least into their mean."""
     rate = abs(point.condition.speed * speed_ratio(point.spindle)) / (2 * np.pi)
     fewest = int(np.ceil(max(SHORTEST * rate, REVOLUTIONS) - 1e-9))
     known, phasor = _known(point)
@@ -162,8 +167,8 @@ def whole_turns(point: OperatingPoint) -> int:
 
 
 def sampling_rate(point: OperatingPoint, integrated: bool = True) -> float:
-    """Lowest sample rate (Hz) of at least 20 kHz and eight samples a period of the highest line looked for; where motion is `integrated`, one
-    that its step divides. BadInput where that step is too long for the line."""
+    """Lowest sample rate (Hz) of at least 20 kHz and eight samples a period of the highest line looked for;
+    where motion is `integrated`, one that its step divides. BadInput where that step is too long for the line."""
     highest = max(line.frequency for line in _known(point)[0])
     wanted, step = max(SAMPLE_RATE, 8 * highest), point.spindle.hammer.step
     rate = 1 / (step * max(1, int(1 / (wanted * step) + 1e-9)))
@@ -182,8 +187,8 @@ def sampling_rate(point: OperatingPoint, integrated: bool = True) -> float:
 
 
 def analyse(point: OperatingPoint, signals: Signals) -> Runout:
-    """Runout, lines and their causes of a record at constant speed, whose first probes are the hub's, and whose clock starts with the turning
-    part at angle 0 (else the predicted sums of lines that beat are those of another moment).
+    """Runout, lines and their causes of a record at constant speed, whose first probes are the hub's, and whose clock
+    starts with the turning part at angle 0 (else the predicted sums of lines that beat are those of another moment).
 
     ValueError if the speed is not constant or the record is shorter than a revolution or too coarse for the lines looked for.
     """
@@ -208,7 +213,8 @@ def _known(point: OperatingPoint) -> tuple[tuple[Line, ...], ComplexArray]:
 
 @dataclass(frozen=True)
 class Plan:
-    """How runout is found: `path` simulated (MuJoCo) or linear (harmonic answer), `samples` at `rate` (Hz), in so many `pieces` of which `runout` tells; none of the linear path."""
+    """How runout is found: `path` simulated (MuJoCo) or linear (harmonic answer), `samples` at
+    `rate` (Hz), in so many `pieces` of which `runout` tells; none of the linear path."""
 
     path: str
     samples: int
@@ -217,7 +223,8 @@ class Plan:
 
 
 def planned(point: OperatingPoint, seconds: float | None = None, element: str = "linear", path: str | None = None) -> Plan:
-    """The plan for a record of `seconds`; without a `path` it is simulated, but linear where linear bearings take more steps than a record can have.
+    """The plan for a record of `seconds`; without a `path` it is simulated, but linear where linear
+    bearings take more steps than a record can have.
 
     BadInput at rest, and for a record shorter than two revolutions.
     """

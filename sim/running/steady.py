@@ -1,8 +1,8 @@
 """Runout of a spindle in its steady state from the lines alone, exactly and without a record: what a study of many spindles asks of each.
 
-At constant speed every probe sees a sum of lines. Those at whole multiples of the speed of what it sees repeat in every revolution and are the RRO; all others are
-the NRRO, whose root mean square follows from their amplitudes (Parseval). Six times that is how drives are specified; a peak to valley value of the NRRO
-would be one of a record, and go with its length.
+At constant speed every probe sees a sum of lines. Those at whole multiples of the speed of what it sees repeat in every
+revolution and are the RRO; all others are the NRRO, whose root mean square follows from their amplitudes (Parseval). Six
+times that is how drives are specified; a peak to valley value of the NRRO would be one of a record, and go with its length.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Line spectra over speed: what a run-up passes through, steady at every speed, with the natural frequencies it crosses.
 
-Every speed is an operating point of its own, so that bearing stiffness, contact angles and gyroscopic effect are right at each. Amplitudes are
-exact at every line, with no resolution in frequency to speak of.
+Every speed is an operating point of its own, so that bearing stiffness, contact angles and gyroscopic
+effect are right at each. Amplitudes are exact at every line, with no resolution in frequency to speak of.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
-"""Designs side by side: the same conditions, figures that every machine has, and where spindles are drawn the probability that one built to a design is better.
+"""Designs side by side: the same conditions, figures that every machine has, and where spindles are
+drawn the probability that one built to a design is better.
 
-Every scene is a design, drawn by its own tolerances and independently of the others. The figures do not go by the numbers of modes, which mean
-something else in every machine: the lowest natural frequency, of all and of every kind that all designs have, its damping ratio, static stiffnesses at
-the hub where runout is seen, and the runout. That a spindle of design A is better than one of B is told over all pairs of draws (Mann, Whitney, *Ann. Math.
-Statist.* 18 (1947) 50; equal ones count half), its standard error by DeLong, DeLong, Clarke-Pearson, *Biometrics* 44 (1988) 837.
+Every scene is a design, drawn by its own tolerances and independently of the others. The figures do not go by the
+numbers of modes, which mean something else in every machine: the lowest natural frequency, of all and of every kind
+that all designs have, its damping ratio, static stiffnesses at the hub where runout is seen, and the runout. That a
+spindle of design A is better than one of B is told over all pairs of draws (Mann, Whitney, *Ann. Math. Statist.* 18
+(1947) 50; equal ones count half), its standard error by DeLong, DeLong, Clarke-Pearson, *Biometrics* 44 (1988) 837.
 """
 
 from __future__ import annotations
@@ -83,7 +85,8 @@ class Designs:
 
 
 def designs(study: Study, spindles: Sequence[Spindle], catalogue: tuple[Effect, ...]) -> Designs:
-    """The designs of a comparison. Raises the named errors where one as it stands has no state at one of the conditions, and `BadInput` for too many cases."""
+    """The designs of a comparison. Raises the named errors where one as it stands has no state at
+    one of the conditions, and `BadInput` for too many cases."""
     if (count := study.draws * len(spindles)) > MOST:
         raise BadInput(f"{study.file}: draws = {study.draws}: {count} cases of {len(spindles)} scenes; at most {MOST} are allowed")
     found = []

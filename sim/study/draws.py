@@ -1,8 +1,8 @@
 """The spindles that a Monte Carlo study draws: what each is off by, what imperfections it has, and mixtures of two sets of them.
 
-Draw k follows from the seed and k alone. For variance-based sensitivities (`sim.study.indices`) a second set is drawn beside the first, and the first once
-more for every input with that input alone taken from the second: (2 + inputs) n cases of n draws, the first set first. Inputs are independent:
-every toleranced parameter, and with a grade the unbalance, the races and the balls of each bearing.
+Draw k follows from the seed and k alone. For variance-based sensitivities (`sim.study.indices`) a second set is drawn beside the
+first, and the first once more for every input with that input alone taken from the second: (2 + inputs) n cases of n draws, the first
+set first. Inputs are independent: every toleranced parameter, and with a grade the unbalance, the races and the balls of each bearing.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ def imperfection_columns(spindle: Spindle) -> dict[str, str]:
 
 
 def imperfection_values(spindle: Spindle, built: Imperfections) -> dict[str, float]:
-    """The columns' values: unbalances; root mean squares of all waves of the races and of the balls, standard deviation of the balls' diameters."""
+    """The columns' values: unbalances; root mean squares of all waves of the races and of the
+    balls, standard deviation of the balls' diameters."""
     found = {"unbalance_g_mm": G_MM * built.unbalance, "couple_unbalance_g_mm2": G_MM2 * built.couple_unbalance}
     for b in spindle.rolling:
         row: RowImperfections = built.row(b.name)

@@ -112,7 +112,8 @@ CHUNK = {SWEEP: 64, MONTE_CARLO: 64, FLEET: 1, COMPARISON: 64}
 
 @dataclass(frozen=True)
 class Study:
-    """A study file, read: `scene` a path or the name of a shipped one (of a comparison the first of `scenes`, called as in `designs`), `vary` values by key, `campaigns` folders, `digest` that of the file."""
+    """A study file, read: `scene` a path or the name of a shipped one (of a comparison the first of
+    `scenes`, called as in `designs`), `vary` values by key, `campaigns` folders, `digest` that of the file."""
 
     file: Path
     title: str
@@ -175,7 +176,8 @@ def read_study(file: Path) -> Study:
 
 
 def _beside(file: Path, key: str, name: str) -> Path:
-    """A scene told in a file: from the file's folder where something is there, else as it is, as the name of a shipped one. Raises `BadInput` where there is none."""
+    """A scene told in a file: from the file's folder where something is there, else as it is, as
+    the name of a shipped one. Raises `BadInput` where there is none."""
     there = file.parent / name
     scene = there if there.exists() else Path(name)
     try:

@@ -1,13 +1,14 @@
 """Variance-based sensitivities: which share of a number's variance each input makes by itself, and which with all others (Sobol).
 
-From two independent sets A and B of n draws, and A with input i from B. With f centred and V its variance over A and B (Saltelli et al., "Variance based
-sensitivity analysis of model output", *Computer Physics Communications* 181 (2010) 259, Table 2 (b) and (f), the second from Jansen 1999):
+From two independent sets A and B of n draws, and A with input i from B. With f centred and V its
+variance over A and B (Saltelli et al., "Variance based sensitivity analysis of model output",
+*Computer Physics Communications* 181 (2010) 259, Table 2 (b) and (f), the second from Jansen 1999):
 
     first order  S_i = mean(f(B) (f(A_i) - f(A))) / V,        total  T_i = mean((f(A) - f(A_i))^2) / (2 V)
 
-S_i is what the variance would lose on average if input i were known, T_i what would be left if all others were. The first orders of an additive answer add up
-to 1 and equal the totals; a total above its first order is interaction. Errors are standard deviations over `RESAMPLED` bootstrap samples of the draws,
-the same ones for all (Archer, Saltelli, Sobol 1997).
+S_i is what the variance would lose on average if input i were known, T_i what would be left if all others were. The first
+orders of an additive answer add up to 1 and equal the totals; a total above its first order is interaction. Errors are
+standard deviations over `RESAMPLED` bootstrap samples of the draws, the same ones for all (Archer, Saltelli, Sobol 1997).
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ class Index:
 
     @property
     def clear(self) -> bool:
-        """Whether the input is known to matter; a total is never below 0, and its error is small where it is, so that it has to be a share as well."""
+        """Whether the input is known to matter; a total is never below 0, and its error is small
+        where it is, so that it has to be a share as well."""
         return self.total > max(CLEAR * self.total_sd, 0.01)
 
 
@@ -50,7 +52,8 @@ class Indices:
 
 
 def indices(names: Sequence[str], a: Array, b: Array, mixed: Array) -> Indices | None:
-    """Of values (n,) of the sets A and B, and (inputs, n) of A with one input from B each; None where they do not vary or too few are finite."""
+    """Of values (n,) of the sets A and B, and (inputs, n) of A with one input from B each; None
+    where they do not vary or too few are finite."""
     known = np.isfinite(a) & np.isfinite(b) & np.isfinite(mixed).all(axis=0)
     a, b, mixed = a[known], b[known], mixed[:, known]
     n = len(a)

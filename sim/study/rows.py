@@ -192,7 +192,8 @@ def _plain(probe: str) -> str:
 
 
 def _stiffness(point: OperatingPoint) -> Row:
-    """Static stiffness (N/um) by probe of the hub, of a force where and along which it looks; None where nothing holds it or it cannot move."""
+    """Static stiffness (N/um) by probe of the hub, of a force where and along which it looks; None
+    where nothing holds it or it cannot move."""
     probes, found = hub_probes(point.spindle), {}
     for probe, row in zip(probes, probe_rows(point, probes), strict=True):
         moved = displacement(point.linear.stiffness, row)

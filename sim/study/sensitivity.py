@@ -1,10 +1,11 @@
 """What a study says of its columns: their spread, which tolerance moves them, and who stands apart.
 
-Sensitivity is by standardised regression coefficients (Saltelli et al., *Global Sensitivity Analysis: The Primer*, 2008, 1.2.5): response and
-inputs in their standard deviations, least squares on the draws that are there anyway. Over tolerances of some per cent the answers of a
-spindle are nearly linear, so the squares of the coefficients share out the variance, and `r2` says how much of it they explain: near 1 nothing
-is missing. How much they explain of draws that they have not seen is told by leaving each out (PRESS: Allen, *Technometrics* 16 (1974) 125);
-where that is not clearly above 0 the coefficients fit noise, and none is `clear`. What a linear law misses `sim.study.indices` tells.
+Sensitivity is by standardised regression coefficients (Saltelli et al., *Global Sensitivity Analysis: The Primer*,
+2008, 1.2.5): response and inputs in their standard deviations, least squares on the draws that are there anyway. Over
+tolerances of some per cent the answers of a spindle are nearly linear, so the squares of the coefficients share out
+the variance, and `r2` says how much of it they explain: near 1 nothing is missing. How much they explain of draws
+that they have not seen is told by leaving each out (PRESS: Allen, *Technometrics* 16 (1974) 125); where that is not
+clearly above 0 the coefficients fit noise, and none is `clear`. What a linear law misses `sim.study.indices` tells.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """Standardised regression coefficients and their standard errors by parameter, the share `r2` of the variance that they explain (adjusted for
-    their number), the share `unseen` of that of draws left out one by one with its standard error, and the parameters that are `clear`."""
+    """Standardised regression coefficients and their standard errors by parameter, the share `r2`
+    of the variance that they explain (adjusted for their number), the share `unseen` of that of
+    draws left out one by one with its standard error, and the parameters that are `clear`."""
 
     coefficient: Mapping[str, float]
     sd: Mapping[str, float]

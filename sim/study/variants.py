@@ -49,7 +49,8 @@ def variant(raw: Mapping[str, Any], file: Path, catalogue: Sequence[Effect], cho
 
 
 def with_values(spindle: Spindle, catalogue: Sequence[Effect], values: Mapping[str, Any]) -> Spindle:
-    """A spindle that was read from a file, with other values of its keys and of effects' parameters, all together; `BadInput` for what its file could not say."""
+    """A spindle that was read from a file, with other values of its keys and of effects'
+    parameters, all together; `BadInput` for what its file could not say."""
     assert spindle.file is not None
     raw, file = read_file(SCENE, spindle.file), spindle.file
     chosen = {str(key): _plain(value) for key, value in values.items()}
@@ -86,7 +87,8 @@ def _plain(value: Any) -> Any:
 
 
 def check(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, catalogue: Sequence[Effect]) -> None:
-    """Refuse (`BadInput`) keys that are none of the scene, and values that its form or an effect does not allow, by themselves or beside the others' first or last ones.
+    """Refuse (`BadInput`) keys that are none of the scene, and values that its form or an effect
+    does not allow, by themselves or beside the others' first or last ones.
 
     Values that only together give no spindle are rows of the study with their error.
     """

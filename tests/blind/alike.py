@@ -1,9 +1,9 @@
 """Which effects of the catalogue could be what is hidden, by what they do and not by their names.
 
-Whoever wrote the hidden mechanisms did not know the effects, and named right answers by their names alone: some cannot do what is hidden (a film has
-no negative thickness), and others do the very same. So every effect, of whatever law (its size in each test its own, within its limits), is fitted to
-the change that a hidden piece makes of the FRFs, in the small and linear, in a world that is the model's own, beside all that tolerances can do. What is left of the change tells. This uses the
-effects of the catalogue, but nothing of the diagnosis.
+Whoever wrote the hidden mechanisms did not know the effects, and named right answers by their names alone: some cannot do what is hidden
+(a film has no negative thickness), and others do the very same. So every effect, of whatever law (its size in each test its own, within
+its limits), is fitted to the change that a hidden piece makes of the FRFs, in the small and linear, in a world that is the model's own,
+beside all that tolerances can do. What is left of the change tells. This uses the effects of the catalogue, but nothing of the diagnosis.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ def _between(m: Mechanism, start: Sequence[float], rest: Callable[[list[float]],
 
 
 def right_names(intended: Sequence[str], left_by: dict[str, float], whole: float) -> list[str]:
-    """The effects that are a right answer to a change of `whole` standard errors, of those that do most of it: what leaves nothing that could be told, or
-    next to nothing; what its author had in mind (`intended`); and what comes nearer than the nearest of these."""
+    """The effects that are a right answer to a change of `whole` standard errors, of those that do most of it: what leaves nothing
+    that could be told, or next to nothing; what its author had in mind (`intended`); and what comes nearer than the nearest of these."""
     if whole < SAME:
         return sorted(intended)  # too little to ask
     most = {name: rest for name, rest in left_by.items() if rest < MOSTLY * whole}
@@ -111,7 +111,8 @@ class _Before:
         return _Before(answer, answer.frf(of.frequency), answer.ways(of.frequency))
 
     def change(self, after: Answer, of: Seen) -> ComplexArray:
-        """What the FRFs change by up to another answer that is all but the same: where the same is measured, by its matrices to the first order."""
+        """What the FRFs change by up to another answer that is all but the same: where the same is
+        measured, by its matrices to the first order."""
         before = self.answer
         same = all(np.array_equal(getattr(after, name), getattr(before, name)) for name in ("responses", "references", "gain", "delay", "decay"))
         if same and after.linear.mass.shape == before.linear.mass.shape:
@@ -122,7 +123,8 @@ class _Before:
 def _by_size(
     built: Spindle, m: Mechanism, shape: list[float], conditions: Sequence[Condition], base: Sequence[_Before], of: Seen
 ) -> tuple[Beside, Array, Array]:
-    """Changes (N, k) by one prior standard deviation of the size in each test, or in all at once of what lasts, and the limits (k,) of these."""
+    """Changes (N, k) by one prior standard deviation of the size in each test, or in all at once of
+    what lasts, and the limits (k,) of these."""
     up = m.size.neutral + SMALL * m.size.prior_sd <= m.size.limits[1]
     step = SMALL if up else -SMALL
     values = m.values(m.size.neutral + step * m.size.prior_sd, shape)

@@ -1,5 +1,5 @@
-"""A campaign of that world: its tests, thermometers and channels a little wrong, and noise either on every line or in time, where decaying records are cut,
-windowed and transformed."""
+"""A campaign of that world: its tests, thermometers and channels a little wrong, and noise either
+on every line or in time, where decaying records are cut, windowed and transformed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ SENSORS_FROM = 2900
 """The first seed in whose world sensors sit beside their points and look askew."""
 
 CONVENTIONS_FROM = 3200
-"""The first seed in whose world channels may be a little late, balls on orbits of their own, and losses of FRFs that are made line by line those of a complex stiffness."""
+"""The first seed in whose world channels may be a little late, balls on orbits of their own, and
+losses of FRFs that are made line by line those of a complex stiffness."""
 
 BY_HAND = 2e-4
 """How far (m) from its point a hammer is known to hit before its misses are told from each other, of the two that worlds have."""
@@ -84,9 +85,10 @@ def drawn_world(random: np.random.Generator, spindle: Spindle) -> World:
 
 
 def further(world: World, seed: int, spindle: Spindle) -> World:
-    """With what worlds have from seed `HAMMERS_FROM` on: thermal motions that are off by a per cent, hammers whose force is off and drifts and that hit beside their points, another way in each
-    test; from `MASSES_FROM` on bodies that have their mass otherwise, by some thousandths; from `SENSORS_FROM` on sensors that are glued by hand; and from `CONVENTIONS_FROM` on what honest
-    programs do otherwise, and modules for sound and vibration."""
+    """With what worlds have from seed `HAMMERS_FROM` on: thermal motions that are off by a per cent, hammers whose
+    force is off and drifts and that hit beside their points, another way in each test; from `MASSES_FROM` on
+    bodies that have their mass otherwise, by some thousandths; from `SENSORS_FROM` on sensors that are glued by
+    hand; and from `CONVENTIONS_FROM` on what honest programs do otherwise, and modules for sound and vibration."""
     if seed < HAMMERS_FROM:
         return world
     if seed >= CONVENTIONS_FROM:
@@ -176,7 +178,8 @@ def beside(faces: Array, by: Array) -> Array:
 
 
 def in_contact(spindle: Spindle, tests: Sequence[Plan], world: World, hidden: Sequence[Hidden]) -> Sequence[Hidden]:
-    """What is hidden, halved until every bearing carries load in every test, whatever the thermometer's error: a spindle that rattles has no FRF."""
+    """What is hidden, halved until every bearing carries load in every test, whatever the
+    thermometer's error: a spindle that rattles has no FRF."""
     off = 4 * spindle.tolerances.temperature
     places = [Condition(p.temperature + by, p.speed) for p in tests for by in (-off, off)]
     for _ in range(10):
@@ -220,7 +223,8 @@ def measured(at: Answer, spindle: Spindle, record: Record, random: np.random.Gen
 
 
 def error_of_hits(frequency: Array, hammer: HammerTest, record: Record) -> Array:
-    """Standard error (n,) of lines of the mean of hits, over the largest value under the window, with that window undone. The force falls with frequency, so that noise over it rises; and white noise
+    """Standard error (n,) of lines of the mean of hits, over the largest value under the window, with
+    that window undone. The force falls with frequency, so that noise over it rises; and white noise
     in time hides as much with a window as without, which takes as much of the answer (Parseval)."""
     window = np.exp(-record.decay / hammer.sample_rate * np.arange(round(record.length * hammer.sample_rate)))
     return np.asarray(record.times * hammer.noise_of_largest / np.sqrt(np.mean(window**2)) / force_of(frequency, hammer))

@@ -1,4 +1,5 @@
-"""In what a machine departs from its drawing alike in all tests: masses otherwise, and random matrices of stiffness and damping in its modes."""
+"""In what a machine departs from its drawing alike in all tests: masses otherwise, and random
+matrices of stiffness and damping in its modes."""
 
 from __future__ import annotations
 
@@ -20,8 +21,9 @@ def ways_of_mass(spindle: Spindle) -> int:
 
 
 def distributed(chain: RotorBase, spindle: Spindle, shares: Sequence[float]) -> RotorBase:
-    """Of every rigid body mass, inertias about x, y (of what turns the first for both) and z, and the height of its centre of mass in radii of gyration, off by five shares; of every shaft the masses of its
-    nodes off by two, one that grows to its end and one to the square of the way there."""
+    """Of every rigid body mass, inertias about x, y (of what turns the first for both) and z, and
+    the height of its centre of mass in radii of gyration, off by five shares; of every shaft the
+    masses of its nodes off by two, one that grows to its end and one to the square of the way there."""
     if not len(shares):
         return chain
     left, factor = list(shares), dict[str, float]()
@@ -46,8 +48,9 @@ def distributed(chain: RotorBase, spindle: Spindle, shares: Sequence[float]) -> 
 
 
 def perturbed(linear: Matrices, reference: Matrices, drawing: Spindle, errors: tuple[float, float], seed: int) -> Matrices:
-    """K and C with a random symmetric matrix in the modes of the drawing's `reference` matrices, the same in every test, of `errors` of stiffness and damping. A weak mode is none of these: it
-    stays an oscillator on its body, which modal errors of the spindle do not couple to anything else."""
+    """K and C with a random symmetric matrix in the modes of the drawing's `reference` matrices, the
+    same in every test, of `errors` of stiffness and damping. A weak mode is none of these: it stays
+    an oscillator on its body, which modal errors of the spindle do not couple to anything else."""
     of_k, of_c, kept = modal_errors(reference, drawing, errors)
     n = len(kept)  # what is hidden, and a weak mode, may have added bodies, after these
     random = np.random.default_rng([seed, 51])
@@ -63,8 +66,9 @@ def perturbed(linear: Matrices, reference: Matrices, drawing: Spindle, errors: t
 
 
 def modal_errors(reference: Matrices, drawing: Spindle, errors: tuple[float, float]) -> tuple[Array, Array, Array]:
-    """Columns (n, m) each of an error of K and of C, v v^T or v w^T + w v^T, at one standard deviation: of the modes of `reference` to twice the drawing's band, (n,)
-    true of all. A mode's frequency is wrong by half of its stiffness, relatively; its damping by a share of its own."""
+    """Columns (n, m) each of an error of K and of C, v v^T or v w^T + w v^T, at one standard
+    deviation: of the modes of `reference` to twice the drawing's band, (n,) true of all. A mode's
+    frequency is wrong by half of its stiffness, relatively; its damping by a share of its own."""
     root = np.sqrt(np.diag(reference.mass))
     square, vectors = np.linalg.eigh(reference.stiffness / root[:, None] / root[None, :])
     omega = np.sqrt(np.maximum(square, 0.0))

@@ -1,8 +1,8 @@
 """Hidden physics: a mechanism (what is changed) times a law over temperature and speed that is drawn anew for every campaign.
 
-Written without a look at the catalogue of effects: nothing here is imported from `sim.effects`, and only the names of effects are known. A
-mechanism says which names would be right answers to it, as far as names tell (`alike` measures it), and which element changes; where a scene has none of
-these names it is outside every catalogue there. Sizes are drawn evenly in their logarithm.
+Written without a look at the catalogue of effects: nothing here is imported from `sim.effects`, and only the names of effects are
+known. A mechanism says which names would be right answers to it, as far as names tell (`alike` measures it), and which element
+changes; where a scene has none of these names it is outside every catalogue there. Sizes are drawn evenly in their logarithm.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ class Hidden:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """A generator of `Hidden`: sizes from `low` to `high` in `unit`, with `sign` or either (0); `constant` laws only, `drift` only, or `any`."""
+    """A generator of `Hidden`: sizes from `low` to `high` in `unit`, with `sign` or either (0);
+    `constant` laws only, `drift` only, or `any`."""
 
     name: str
     unit: str

@@ -1,5 +1,5 @@
-"""Laws over temperature and speed, drawn anew for every campaign and nobody's: plain shapes (linear, power, exponential, Arrhenius, sigmoid, step, their
-mixtures, constant), zero at 20 C and at rest unless constant, one at their largest over the tests of the campaign."""
+"""Laws over temperature and speed, drawn anew for every campaign and nobody's: plain shapes (linear, power, exponential, Arrhenius,
+sigmoid, step, their mixtures, constant), zero at 20 C and at rest unless constant, one at their largest over the tests of the campaign."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """`python -m tests.blind.score FILE ...`: what a diagnosis is worth where the truth is known, printed and written to docs/blind.txt.
 
-Shares have Clopper and Pearson's 95 % interval (*Biometrika* 26 (1934) 404). The log score is the mean of ln of the probability that was stated
-for the truth, no less than ln 0.001 each (Good, *J. R. Statist. Soc. B* 14 (1952) 107). A hidden piece whose change of the FRFs is less than sqrt(10)
-standard errors, 5 in ln evidence, after what tolerances, and the other piece where there are two, could take of it, need not be found, and may be; from twice that on it counts as visible.
+Shares have Clopper and Pearson's 95 % interval (*Biometrika* 26 (1934) 404). The log score is the mean of ln of the
+probability that was stated for the truth, no less than ln 0.001 each (Good, *J. R. Statist. Soc. B* 14 (1952) 107). A hidden
+piece whose change of the FRFs is less than sqrt(10) standard errors, 5 in ln evidence, after what tolerances, and the other
+piece where there are two, could take of it, need not be found, and may be; from twice that on it counts as visible.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ DOCS = ROOT / "docs" / "blind.txt"
 
 
 def truths(row: Row) -> list[list[str]]:
-    """Of every hidden piece the effects that are right answers, as measured (`tests.blind.alike`); of older rows those that its author had in mind."""
+    """Of every hidden piece the effects that are right answers, as measured (`tests.blind.alike`);
+    of older rows those that its author had in mind."""
     return row.get("right", row["truth"])
 
 
@@ -49,7 +51,8 @@ def shows(row: Row) -> bool:
 
 
 def beside(row: Row) -> list[float]:
-    """How visible every hidden piece is beside the other, as much of which as there is in every test could do its part: of two of which each does what the other does, either is the whole answer."""
+    """How visible every hidden piece is beside the other, as much of which as there is in every test
+    could do its part: of two of which each does what the other does, either is the whole answer."""
     return row.get("visibility_beside") or row["visibility"]
 
 
@@ -59,8 +62,9 @@ def needed(row: Row) -> list[bool]:
 
 
 def outcome(row: Row) -> str:
-    """right: nothing said where nothing shows, no name but those of what is hidden and all of what shows, or `unexplained` of what is in no catalogue;
-    half: one of two, and no other; unexplained: of what a name stands for; wrong: any name that is none of the truth's, or a set without all of it."""
+    """right: nothing said where nothing shows, no name but those of what is hidden and all of what
+    shows, or `unexplained` of what is in no catalogue; half: one of two, and no other; unexplained: of
+    what a name stands for; wrong: any name that is none of the truth's, or a set without all of it."""
     verdict, named = row["verdict"], set(row["effects"])
     if verdict == "error":
         return "error"
@@ -98,8 +102,8 @@ def halved(row: Row) -> bool:
 
 
 def above_noise(row: Row) -> bool:
-    """Whether half the error without effects is more than is left where nothing is hidden: with noise and with all that differs from test to test; rows from before that was asked have noise alone, one
-    standard error."""
+    """Whether half the error without effects is more than is left where nothing is hidden: with noise and with
+    all that differs from test to test; rows from before that was asked have noise alone, one standard error."""
     before, _, *least = row["drafted"]
     return bool(before > 2 * (least[0] if least else 1.0))
 

@@ -1,8 +1,9 @@
-"""`python -m tests.blind.study --seeds A B [--out FILE.jsonl] [--cluster ADDRESS]`: campaigns A to B - 1, made and diagnosed, a line of JSON each.
+"""`python -m tests.blind.study --seeds A B [--out FILE.jsonl] [--cluster ADDRESS]`: campaigns A to
+B - 1, made and diagnosed, a line of JSON each.
 
-A seed is a campaign, wherever and whenever it is run: scene, tests, world, hidden physics and noise follow from it. Seeds that are in the file
-already are passed over, so that the study can be stopped and goes on where it was. On a Dask cluster a campaign is a task: its workers are started in this
-repository (`PYTHONPATH=. dask worker ...`), at the same commit; rows come in the order in which they are done.
+A seed is a campaign, wherever and whenever it is run: scene, tests, world, hidden physics and noise follow from it. Seeds that are in the
+file already are passed over, so that the study can be stopped and goes on where it was. On a Dask cluster a campaign is a task: its
+workers are started in this repository (`PYTHONPATH=. dask worker ...`), at the same commit; rows come in the order in which they are done.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ from thermospindle.sim.study.parts import versions
 ROOT = Path(__file__).parents[2]
 SCENES = ("scenes/hdd_2003", "tests/scenes/symmetric", "tests/scenes/inner_turning_spring")
 FURTHER, FURTHER_FROM, FURTHER_SHARE = "scenes/five_bearing", 1000, 0.25
-"""A machine-tool spindle: a flexible shaft on five bearings in two sets, one campaign in four from this seed on; seeds before it were judged without."""
+"""A machine-tool spindle: a flexible shaft on five bearings in two sets, one campaign in four from
+this seed on; seeds before it were judged without."""
 RESULTS = ROOT / "out" / "blind" / "results.jsonl"
 KINDS = ("nothing", "one", "two", "outside")
 SHARES = (1 / 3, 1 - 1 / 3 - 2 / 5, 1 / 5, 1 / 5)
@@ -152,9 +154,9 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def weighed(found: Diagnosis) -> dict[str, Any]:
-    """What a verdict is made of, for whoever asks what another weighing would have said: of every explanation its names, how many of them are free, ln
-    evidence over the model without effects, the largest departure from a law and the names whose law is the data's own; the inflation of the evidence, and
-    whether it is coarsened."""
+    """What a verdict is made of, for whoever asks what another weighing would have said: of every explanation
+    its names, how many of them are free, ln evidence over the model without effects, the largest departure from
+    a law and the names whose law is the data's own; the inflation of the evidence, and whether it is coarsened."""
     search, base = found.search, found.search.base.evidence.ln
     best = likeliest(search)
     same = overlap(search.model, best.fit)
@@ -183,8 +185,9 @@ def without_hidden(drawn: Drawn, made: Made) -> Campaign:
 
 
 def drafted(found: Diagnosis, told: dict[str, Any], plain: Campaign) -> list[float]:
-    """Root mean square error, in standard errors, of conditions predicted from all others: without effects; with the effect of one's own that
-    `spindle draft` writes of the first drift; and of the `plain` campaign without effects, of which thermometers, channels and hits that differ from test to test leave more than noise."""
+    """Root mean square error, in standard errors, of conditions predicted from all others: without effects; with
+    the effect of one's own that `spindle draft` writes of the first drift; and of the `plain` campaign without
+    effects, of which thermometers, channels and hits that differ from test to test leave more than noise."""
     with TemporaryDirectory() as folder:
         answer, file = Path(folder) / "diagnosis.json", Path(folder) / "drafted.py"
         answer.write_text(json.dumps(told), encoding="utf-8")

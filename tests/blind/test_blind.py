@@ -93,7 +93,8 @@ def test_a_damper_and_a_complex_stiffness_lose_as_much_at_one_frequency(scene):
 
 
 def test_what_honest_programs_do_otherwise_is_in_later_worlds():
-    """Channels that are late, balls on orbits of their own at speed alone, losses of a complex stiffness where lines are not from records in time; all among what may stand in."""
+    """Channels that are late, balls on orbits of their own at speed alone, losses of a complex
+    stiffness where lines are not from records in time; all among what may stand in."""
     drawn, record = draw(948), Record("line", told="noise", times=1e-9)
     worlds = [further(World(), seed, drawn.spindle) for seed in range(CONVENTIONS_FROM, CONVENTIONS_FROM + 20)]
     assert {w.late for w in worlds} == {0.0, 1e-8, 3e-8}
@@ -137,7 +138,8 @@ def test_hammers_of_later_worlds_have_gains_of_their_own():
 
 
 def test_sensors_of_later_worlds_are_glued_by_hand():
-    """The same in all tests, each channel by itself; of seeds from before to the last bit where they are drawn. Both are among what may stand in, where a world has them."""
+    """The same in all tests, each channel by itself; of seeds from before to the last bit where
+    they are drawn. Both are among what may stand in, where a world has them."""
     drawn, record = draw(948), Record("line", told="noise", times=1e-9)
     assert further(World(), SENSORS_FROM - 1, drawn.spindle).place == further(World(), SENSORS_FROM - 1, drawn.spindle).askew == 0.0
     assert min(further(World(), SENSORS_FROM, drawn.spindle).place, further(World(), SENSORS_FROM, drawn.spindle).askew) > 0
@@ -156,7 +158,8 @@ def test_sensors_of_later_worlds_are_glued_by_hand():
 
 
 def test_of_two_that_do_the_same_neither_shows_beside_the_other():
-    """And one that does something else shows nearly as well as alone. What hammers are off by is among what may stand in, where a world has it."""
+    """And one that does something else shows nearly as well as alone. What hammers are off by is
+    among what may stand in, where a world has it."""
     drawn = draw(995)
     made = drawn.made()
     of = seen(made, drawn.spindle)
@@ -243,8 +246,8 @@ def _visible(drawn, hidden):
 
 
 def test_what_a_tolerance_does_is_not_visible():
-    """A mount softer by one standard deviation of its tolerance in every test: the very change of one column, of 36,000 standard errors; not quite its length, for
-    the tolerance is of a logarithm and has its own prior."""
+    """A mount softer by one standard deviation of its tolerance in every test: the very change of one column,
+    of 36,000 standard errors; not quite its length, for the tolerance is of a logarithm and has its own prior."""
     drawn = draw(2)
     softer = next(m for m in mechanisms(drawn.spindle, ()) if m.name == "mount softens").of_size(0.0, lambda place: 1.0)
     assert _visible(drawn, replace(softer, size=100 * drawn.spindle.tolerances.structure)) < 1.5
@@ -263,7 +266,8 @@ def test_visibility_beside_a_weak_mode_is_what_it_is_without():
 
 @pytest.mark.parametrize("record", [Record(), Record("rectangular", 0.15, 1.0, 4), Record("exponential", 0.15, 0.1, 4, times=2.0)], ids=lambda r: r.kind)
 def test_noise_by_which_changes_are_measured_is_the_noise_of_the_lines(record):
-    """Of as many campaigns as are enough to tell it to some per cent; of a window that was undone as much more as the window takes of the noise."""
+    """Of as many campaigns as are enough to tell it to some per cent; of a window that was undone
+    as much more as the window takes of the noise."""
     drawn = draw(2)
     made = campaign(drawn.spindle, drawn.tests[:1], [], 5, World(), record)
     of = seen(made, drawn.spindle)
@@ -287,7 +291,8 @@ def test_visibility_grows_with_size_and_gains_hide_a_gain():
 
 @pytest.mark.slow
 def test_right_answers_are_what_effects_do():
-    """Rings apart are cleared by what opens the clearance, not by a film, which only brings them together; softer bearings by a bond; a whirl force by nothing."""
+    """Rings apart are cleared by what opens the clearance, not by a film, which only brings them
+    together; softer bearings by a bond; a whirl force by nothing."""
     drawn = draw(2)
     every = {m.name: m for m in mechanisms(drawn.spindle, ("clearance_opening", "lubricant_film", "bond_softening"))}
     pieces = [every["outer rings grow"].of_size(0.5), every["cross-coupled stiffness of the bearings"].of_size(1.0)]
@@ -300,7 +305,8 @@ def test_right_answers_are_what_effects_do():
 
 @pytest.mark.parametrize(("scene", "turns"), [(SCENES[0], 1.0), (FURTHER, 0.0), (FURTHER, 1.0)])
 def test_a_small_change_of_the_frfs_is_what_other_matrices_do(scene, turns):
-    """To the first order, by central differences of a mobility that is solved anew, where gyroscopic moments make matrices unsymmetric and where not."""
+    """To the first order, by central differences of a mobility that is solved anew, where
+    gyroscopic moments make matrices unsymmetric and where not."""
     spindle = load(ROOT / scene)
     at = answer(spindle, Condition(30.0, turns * spindle.nominal_speed), World())
     frequency = np.linspace(*spindle.hammer.band, 12)
@@ -311,7 +317,8 @@ def test_a_small_change_of_the_frfs_is_what_other_matrices_do(scene, turns):
 
 
 def test_a_mass_is_a_disk_of_some_shape():
-    """At the centre of the hub and without inertia, which a disk as its prior has it is not: its height and its radius of gyration are sought."""
+    """At the centre of the hub and without inertia, which a disk as its prior has it is not: its
+    height and its radius of gyration are sought."""
     drawn = draw(736)
     made = campaign(drawn.spindle, drawn.tests[:3], [next(m for m in mechanisms(drawn.spindle, ("added_disk",)) if m.name == "mass added to hub").of_size(1.0)], 5)
     effects = [e for e in CATALOGUE if e.name == "added_disk"]
@@ -322,7 +329,8 @@ def test_a_mass_is_a_disk_of_some_shape():
 
 
 def test_right_names():
-    """Of a change of 1000 standard errors; what its author had in mind may leave 300, what nobody had in mind nothing that could be told or a hundredth."""
+    """Of a change of 1000 standard errors; what its author had in mind may leave 300, what nobody
+    had in mind nothing that could be told or a hundredth."""
     left_by = {"meant": 200.0, "nearer": 150.0, "further": 250.0, "nearly": 9.0, "same": 3.0, "off": 900.0}
     assert right_names(("meant", "off"), left_by, 1000.0) == ["meant", "nearer", "nearly", "same"]
     assert right_names((), left_by, 1000.0) == ["nearly", "same"]

@@ -116,7 +116,8 @@ def test_what_one_temperature_alone_shows_no_law_tells():
 
 
 def test_of_two_that_do_the_same_either_is_the_whole_answer():
-    """Grooves that shrank and a weaker preload of 40 standard errors each, and 3 beside the other (blind campaign 2398): either name is right, and that nothing is missing is not."""
+    """Grooves that shrank and a weaker preload of 40 standard errors each, and 3 beside the other
+    (blind campaign 2398): either name is right, and that nothing is missing is not."""
     both = row("two", "identified", ["preload_loss"], [["preload_loss"], ["clearance_opening"]])
     assert outcome(both | {"visibility_beside": [50.0, 50.0]}) == "half"
     alike = {"visibility": [50.0, 40.0], "visibility_beside": [3.0, 2.6]}

@@ -26,9 +26,9 @@ INERTIA_SD = 0.1  # relative, of the balls' inertia loads: programs differ in th
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What a campaign can tell apart: lines (Hz), standard errors of every test's FRFs there, and the columns (N, k) of all that may stand in for a
-    change, each at one standard deviation: build tolerances, temperatures, gains and each mode's constant error, with what couples any two; in worlds that
-    have them thermal motions, hammers' gains, and where sensors sit and look."""
+    """What a campaign can tell apart: lines (Hz), standard errors of every test's FRFs there, and the columns (N, k) of all that
+    may stand in for a change, each at one standard deviation: build tolerances, temperatures, gains and each mode's constant
+    error, with what couples any two; in worlds that have them thermal motions, hammers' gains, and where sensors sit and look."""
 
     frequency: Array
     sd: tuple[Array, ...]
@@ -168,15 +168,16 @@ def change(made: Made, spindle: Spindle, of: Seen, h: Hidden, share: float, worl
 
 
 def visibility(made: Made, spindle: Spindle, of: Seen) -> list[float]:
-    """Of every hidden piece: its change of the FRFs in standard errors, after all that else may take of it; sqrt(10) is worth 5 in ln evidence.
-    Of the piece itself and of a little of it over its share the smaller: what moves peaks by many widths is no longer what small
-    tolerances do, but a larger tolerance may do the same."""
+    """Of every hidden piece: its change of the FRFs in standard errors, after all that else may take of it;
+    sqrt(10) is worth 5 in ln evidence. Of the piece itself and of a little of it over its share the smaller: what
+    moves peaks by many widths is no longer what small tolerances do, but a larger tolerance may do the same."""
     plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
     return [_shows(of, [change(made, spindle, of, h, share, plain) for share in (1.0, SMALL)]) for h in made.hidden]
 
 
 def visibility_beside(made: Made, spindle: Spindle, of: Seen) -> list[float]:
-    """The same of every piece where two are hidden, after what the other, as much of it as there is in every test by itself, could take: the law of what is named is the data's."""
+    """The same of every piece where two are hidden, after what the other, as much of it as there is
+    in every test by itself, could take: the law of what is named is the data's."""
     plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
     changes = [[change(made, spindle, of, h, share, plain) for share in (1.0, SMALL)] for h in made.hidden]
     found = []

@@ -1,8 +1,9 @@
-"""Campaigns by a structurally different program: another mesh, another solver of the bearings, other physics where a model is free to differ.
+"""Campaigns by a structurally different program: another mesh, another solver of the bearings,
+other physics where a model is free to differ.
 
-`World` says in what; its defaults are the fitted program's own choices, and then `answer` is the same FRF by another way. Nothing of `sim.effects`
-or `sim.operating` is used: rings from `thermal.expand`, ball rows and their tangent from `model.bearing`, the axial balance solved here, matrices
-from the chain, and hidden physics (`hidden`) at each step.
+`World` says in what; its defaults are the fitted program's own choices, and then `answer` is the same FRF by another
+way. Nothing of `sim.effects` or `sim.operating` is used: rings from `thermal.expand`, ball rows and their tangent from
+`model.bearing`, the axial balance solved here, matrices from the chain, and hidden physics (`hidden`) at each step.
 """
 
 from __future__ import annotations
@@ -99,8 +100,8 @@ class Answer:
     hysteretic: tuple[float, float] = (0.0, 1.0)  # share, and rad/s at which it is as much as a damper's
 
     def frf(self, frequency: Array, window: float = 0.0) -> ComplexArray:
-        """Mobility (n_resp, n_ref, n) at `frequency` (Hz), by the dynamic stiffness line by line, of a flexible shaft by all its poles; the window
-        is in it."""
+        """Mobility (n_resp, n_ref, n) at `frequency` (Hz), by the dynamic stiffness line by line,
+        of a flexible shaft by all its poles; the window is in it."""
         s = 2j * np.pi * frequency + self.decay + window
         if len(self.linear.mass) > LARGE and not self.hysteretic[0]:
             p: Poles = poles(self.linear)
@@ -169,8 +170,9 @@ def answer(
     hits: Array | None = None,
     sensors: tuple[Array, Array] | None = None,
 ) -> Answer:
-    """A spindle at a condition, in a world, with hidden physics; `place` is where their laws are asked, by default the condition, `hits` (hammers, 3) where hammers are aimed at, by
-    default their points, and `sensors` where these sit and what way they look (points, 3), by default theirs."""
+    """A spindle at a condition, in a world, with hidden physics; `place` is where their laws are
+    asked, by default the condition, `hits` (hammers, 3) where hammers are aimed at, by default their
+    points, and `sensors` where these sit and what way they look (points, 3), by default theirs."""
     if place is None:
         place = condition.temperature, abs(condition.speed) / spindle.nominal_speed
 

@@ -74,7 +74,8 @@ def test_a_pair_comes_with_both_its_values(add, tmp_path):
 
 
 def test_one_effect_has_the_values_that_it_has_alone(add, tmp_path):
-    """Where an explanation is that effect alone, however probable; else those of the likeliest that has it. Both is said; a pair's values were taken for its own."""
+    """Where an explanation is that effect alone, however probable; else those of the likeliest that
+    has it. Both is said; a pair's values were taken for its own."""
     [pair, other] = answer()["candidates"]
     alone = {"effects": ["preload_loss"], "parameters": {"preload_loss.loss": row(0.35)}}
     found = add("alone", "preload_loss", found=answer() | {"candidates": [pair, other, alone]})
@@ -171,7 +172,8 @@ def test_what_has_another_law_in_the_data_says_where_to_get_it(add):
 
 @pytest.mark.parametrize(("element", "effects", "beside"), [("preload", [], ["preload"]), ("preload_loss", ["preload_loss"], ["preload_loss"])])
 def test_what_was_drafted_comes_with_the_tolerances_that_were_fitted_beside_it(add, tmp_path, element, effects, beside):
-    """Of an element that drifts, and of an effect with the sizes that were seen. It was no candidate's, so that the error stayed where it was."""
+    """Of an element that drifts, and of an effect with the sizes that were seen. It was no
+    candidate's, so that the error stayed where it was."""
     rows = [{"temperature_C": t, "speed_rpm": 0.0, ("relative" if not effects else "change_1"): (t - 20) / 200, "sd": 0.01} for t in (20.0, 40.0, 60.0)]
     place = {"element": element, "unit": "%" if not effects else "1", "change": rows} | ({"effect": {"values": {}}} if effects else {})
     candidates = [{"effects": effects, "parameters": {"loss": row(0.1)}}] if effects else []

@@ -51,7 +51,8 @@ def test_standard_errors_are_never_below_the_floor(itself):
 
 
 def test_standard_errors_grow_with_those_of_the_lines(spindle, clean):
-    """Lines said to be twice as uncertain (at ten times one lateral mode is lost): the estimator's variance is fourfold, beside a floor that stays."""
+    """Lines said to be twice as uncertain (at ten times one lateral mode is lost): the estimator's
+    variance is fourfold, beside a floor that stays."""
     campaign, observed = clean
     tests = tuple(replace(t, frf=replace(t.frf, sd=2 * t.frf.sd)) for t in campaign.tests[:1])
     (rough,) = observe(replace(campaign, tests=tests), spindle)
@@ -204,7 +205,8 @@ def test_a_build_without_effects_is_within_tolerances(spindle):
 
 
 def test_modes_that_no_point_shows_are_not_missed(spindle):
-    """The driving point of one plane shows no mode of the other: those were told as "computed, not measured", among which what is really missed is lost."""
+    """The driving point of one plane shows no mode of the other: those were told as "computed, not
+    measured", among which what is really missed is lost."""
     campaign = read_campaign(DATA / "foreign_bond")
     test = next(t for t in campaign.tests if t.id == "T20_n0")
     one = replace(test.frf, value=test.frf.value[:1, :1], coherence=None, sd=None, response_nodes=(1,), reference_nodes=(1,))

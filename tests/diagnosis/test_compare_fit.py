@@ -1,4 +1,5 @@
-"""Parameters fitted to the errors of `compare`: residuals whose squares are its own, priors where nothing is told, limits, standard errors that come true."""
+"""Parameters fitted to the errors of `compare`: residuals whose squares are its own, priors where
+nothing is told, limits, standard errors that come true."""
 
 from dataclasses import replace
 

@@ -207,7 +207,8 @@ def roved(frf, sensor=None):
 
 
 def test_a_roving_hammers_shapes_are_those_at_its_points(spindle):
-    """One sensor and seven hammer points: MAC and COMAC as of seven sensors and one hammer point. They were those of single numbers, 1 always."""
+    """One sensor and seven hammer points: MAC and COMAC as of seven sensors and one hammer point.
+    They were those of single numbers, 1 always."""
     tests = read_campaign(DATA / "foreign_bond")
     rest = [t for t in tests.tests if t.speed == 0 and t.frf is not None][:2]
     sensors = replace(tests, tests=tuple(replace(t, frf=replace(t.frf, value=t.frf.value[:, :1], sd=None, coherence=None, reference_nodes=t.frf.reference_nodes[:1])) for t in rest))

@@ -15,7 +15,8 @@ def row(temperature, *residuals):
 
 
 def test_share_and_rest_by_hand():
-    """Residuals 3 and 1 about their mean 2: 1 + 1 are left for 2 - 1 degrees of freedom, of mean squares (9 + 1) / 2; 1 - 2 / 5 is explained."""
+    """Residuals 3 and 1 about their mean 2: 1 + 1 are left for 2 - 1 degrees of freedom, of mean
+    squares (9 + 1) / 2; 1 - 2 / 5 is explained."""
     found = constant_errors([row(20.0, 3.0), row(60.0, 1.0)])
     assert found.share == pytest.approx(0.6)
     assert found.without == pytest.approx(np.sqrt(2))

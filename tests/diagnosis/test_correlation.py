@@ -52,7 +52,8 @@ def test_a_scale_is_seen_by_csf_only(spindle, point):
 
 
 def test_a_factor_that_all_frfs_share_is_told_in_dB(spindle, point):
-    """Accelerations told in g for m/s^2, beside shapes and frequencies that are right: 25 dB that a page alone showed. One channel that is off is none."""
+    """Accelerations told in g for m/s^2, beside shapes and frequencies that are right: 25 dB that a
+    page alone showed. One channel that is off is none."""
     value = point.frf(LINES)
     wrong = value.copy()
     wrong[2] *= 0.1
@@ -62,7 +63,8 @@ def test_a_factor_that_all_frfs_share_is_told_in_dB(spindle, point):
 
 @pytest.mark.parametrize("factor", [1.0, 1.04, 1.15, 0.88])
 def test_a_sensor_whose_sensitivity_is_off_is_told(spindle, point, factor):
-    """15 % that MAC, COMAC and FRAC are blind to, beside gains known to 1 % and noise that makes small FRFs larger; 4 % are within what calibrations are known to."""
+    """15 % that MAC, COMAC and FRAC are blind to, beside gains known to 1 % and noise that makes
+    small FRFs larger; 4 % are within what calibrations are known to."""
     random, exact = np.random.default_rng(5), point.frf(LINES)
     gains = 1 + 0.01 * random.standard_normal(len(exact))
     gains[3] = factor
@@ -78,7 +80,8 @@ def test_a_sensor_whose_sensitivity_is_off_is_told(spindle, point, factor):
 
 @pytest.mark.parametrize(("own", "told"), [((0.2, 0.2), 0.2), ((0.15, 0.25), 0.2), ((0.1, 0.3), None)])
 def test_a_sensor_whose_own_frfs_differ_is_not_told(own, told):
-    """FRFs of two sensors as computed, of a third exp(own) of that with either hammer: 0.2 is 4 times 0.05 but only 2 times 0.1, where 2.5 times is asked."""
+    """FRFs of two sensors as computed, of a third exp(own) of that with either hammer: 0.2 is 4
+    times 0.05 but only 2 times 0.1, where 2.5 times is asked."""
     computed = np.ones((3, 2, 4))
     gain = np.exp([[0.0, 0.0], [0.0, 0.0], own])
     frf = Frf(np.arange(1.0, 5.0), gain[:, :, None] * computed, (1, 2, 3), (1, 2), "mobility")

@@ -52,7 +52,8 @@ def test_a_table_of_more_modes_than_the_spindle_may_have_there_is_refused(spindl
 
 
 def test_an_effect_that_cannot_be_worked_out_is_told(spindle):
-    """Grease whose law ends at 30 C, and tests at 20 and at 40 C: friction heat is no explanation of the running one at 40 C, and who reads the answer is told why."""
+    """Grease whose law ends at 30 C, and tests at 20 and at 40 C: friction heat is no explanation
+    of the running one at 40 C, and who reads the answer is told why."""
     viscosity = spindle.thermal.friction.viscosity
     short = Law((-20.0, 30.0), (viscosity(-20.0), viscosity(30.0)))
     cold = replace(spindle, thermal=replace(spindle.thermal, friction=replace(spindle.thermal.friction, viscosity=short)))
@@ -145,7 +146,8 @@ def test_a_softening_bond_of_another_program(spindle):
 
 @pytest.mark.slow
 def test_a_turning_part_that_is_warmer_is_no_wrong_thermometer():
-    """Blind campaigns 941 and 2216: a warmer turning part, where outer rings turn, was named `thermometer_error`, the nearest that could be. Its law is not the effect's: a step."""
+    """Blind campaigns 941 and 2216: a warmer turning part, where outer rings turn, was named
+    `thermometer_error`, the nearest that could be. Its law is not the effect's: a step."""
     symmetric = load(ROOT / "tests" / "scenes" / "symmetric" / "spindle.toml")
 
     def warmer(spindle, condition, values, before):

@@ -51,8 +51,8 @@ def drafted(answer, folder):
 
 
 def test_a_shape_that_the_tests_do_not_tell_is_said_to_be_none(tmp_path):
-    """Nothing up to 30 C, some at 40, all from 50 on: how steep a sigmoid is there no test says (it was drafted with +- 32000 K). It is a number in the law, for as a parameter it would move nothing, and
-    `add` refused the file."""
+    """Nothing up to 30 C, some at 40, all from 50 on: how steep a sigmoid is there no test says (it was drafted with
+    +- 32000 K). It is a number in the law, for as a parameter it would move nothing, and `add` refused the file."""
     text, own, _ = drafted(of_rings(tmp_path, [0.0, 0.0, 3.0, 7.7, 7.7], 0.4, AT[:5]), tmp_path)
     assert own.title.endswith("sigmoid in temperature")
     assert " K (not told by these tests)." in text
@@ -94,8 +94,8 @@ STEEP, SLIGHT = [0.5 + np.exp((t - 70) / 4) for t in AT], [3 + 0.02 * (t - 20) /
 
 @pytest.mark.parametrize("change", [STEEP, SLIGHT, [0.5 + np.exp(9000 * (1 / 343.15 - 1 / (t + 273.15))) for t in AT]], ids=["steep", "slight", "Arrhenius"])
 def test_an_offset_may_be_large_beside_what_changes(change, tmp_path):
-    """What is drafted keeps the rules and gives what was found: the offset over the size, of a law that is 1e-5 of what it is when hot, was 134 169 and
-    beyond its limits."""
+    """What is drafted keeps the rules and gives what was found: the offset over the size, of a law
+    that is 1e-5 of what it is when hot, was 134 169 and beyond its limits."""
     _, own, law = drafted(of_rings(tmp_path, change, 1e-3), tmp_path)
     assert [law(t, 0.0, own.typical()) for t in AT] == pytest.approx(change, abs=4e-3)
     assert own.parameters[1].name == "offset"
@@ -104,7 +104,8 @@ def test_an_offset_may_be_large_beside_what_changes(change, tmp_path):
 
 
 def test_what_is_drafted_with_an_offset_is_nothing_of_no_size(spindle, tmp_path):
-    """By every rule that `add` has: an offset beside the size was still there where the size was none, and `add` refused what `draft` had written."""
+    """By every rule that `add` has: an offset beside the size was still there where the size was
+    none, and `add` refused what `draft` had written."""
     for share in (0.1, 1.0):  # the bearings pressed, and loose
         text, own, _ = drafted(of_rings(tmp_path, [share * c for c in SLIGHT], 1e-3 * share), tmp_path)
         assert "+ offset" in text
@@ -118,7 +119,8 @@ def test_what_changes_by_nothing_is_not_drafted(tmp_path):
 
 
 def test_a_law_that_two_tests_rule_out_is_not_drafted(tmp_path):
-    """1 um at 20 C and 10 um at 60 C, to 0.1: once a constant of 5 +- 0.07. As many parameters as tests fit both, and the file says what that is worth."""
+    """1 um at 20 C and 10 um at 60 C, to 0.1: once a constant of 5 +- 0.07. As many parameters as
+    tests fit both, and the file says what that is worth."""
     text, own, law = drafted(of_rings(tmp_path, [1.0, 10.0], 0.1, (20.0, 60.0)), tmp_path)
     assert "linear in temperature" in own.title
     assert "2 parameters fit 2 tests whatever changes over them" in text
@@ -144,8 +146,9 @@ COMMON, OWN = 0.3, 0.003  # um, errors that all tests have alike and each its ow
 
 @pytest.mark.parametrize(("slope", "shift", "law"), [(0.1, 0.0, "linear in temperature"), (0.1, 1.5, "linear in temperature, and a constant"), (0.0, 1.5, "constant")])
 def test_what_is_wrong_alike_in_all_tests_hides_no_law(slope, shift, law, tmp_path):
-    """0.1 um over 50 K, 33 times what tests have of their own: with the standard errors alone, of nearly nothing but the common one, a constant was drafted.
-    Size and error are those of generalised least squares (Aitken 1936) on paper: the common error leaves the slope alone."""
+    """0.1 um over 50 K, 33 times what tests have of their own: with the standard errors alone, of
+    nearly nothing but the common one, a constant was drafted. Size and error are those of
+    generalised least squares (Aitken 1936) on paper: the common error leaves the slope alone."""
     random = np.random.default_rng(1)
     change = shift + COMMON * random.standard_normal() + slope * (np.array(AT) - 20) / 50 + OWN * random.standard_normal(6)
     answer = of_rings(tmp_path, change, float(np.hypot(COMMON, OWN)))
@@ -184,7 +187,8 @@ CONDITIONS = [Condition(t, n * RPM) for t, n in ((20, 0), (20, 7200), (28, 0), (
 
 @pytest.fixture(scope="module")
 def slipping(spindle, tmp_path_factory):
-    """Tables of modes of a spindle whose preload slips off by a fifth between 36 and 44 C, and what the free form says of them, as an answer."""
+    """Tables of modes of a spindle whose preload slips off by a fifth between 36 and 44 C, and what
+    the free form says of them, as an answer."""
     hidden = next(m for m in free_forms(spindle) if m.name == "preload")
 
     def slip(spindle, condition, values):
@@ -230,8 +234,8 @@ def test_with_the_drafted_effect_the_error_falls(slipping, tmp_path):
 
 
 def test_an_effect_of_the_catalogue_is_drafted_with_the_law_that_the_data_have(spindle, tmp_path):
-    """Rings warmer by a law of temperature at rest, where friction gives nothing: the file acts as the effect does at 60 C and 7200 rpm, its size by the
-    law; at no size not at all, and what cannot be it is refused as the effect itself is."""
+    """Rings warmer by a law of temperature at rest, where friction gives nothing: the file acts as the effect does at 60
+    C and 7200 rpm, its size by the law; at no size not at all, and what cannot be it is refused as the effect itself is."""
     at, values = Condition(60.0, 7200 * RPM), {"common_share": 0.2, "level_share": 0.0}
     rows = [{"temperature_C": t, "speed_rpm": n, "change_1": 0.02 * (t - 20), "sd": 0.01} for t in (20.0, 30.0, 40.0, 60.0) for n in (0.0, 7200.0)]
     effect = {"at": {"temperature_C": 60.0, "speed_rpm": 7200.0}, "values": values}
@@ -261,7 +265,8 @@ def test_an_effect_of_the_catalogue_is_drafted_with_the_law_that_the_data_have(s
 
 
 def test_an_effect_that_departs_from_its_law_acts_by_its_formula_in_the_size_that_was_seen(spindle, tmp_path):
-    """Without a condition `at` which its formula is asked: at each test's own. Half the size at 60 C, where a law of its own softens with temperature."""
+    """Without a condition `at` which its formula is asked: at each test's own. Half the size at 60
+    C, where a law of its own softens with temperature."""
     softening = by_name("bond_softening", CATALOGUE)
     size, *others = softening.parameters
     values = {p.name: p.typical for p in others}
@@ -279,7 +284,8 @@ def test_an_effect_that_departs_from_its_law_acts_by_its_formula_in_the_size_tha
 
 @pytest.mark.parametrize(("told", "counted"), [({"reference_temperature_C": 35.0}, "(T - 35) / 40"), ({"reference_temperature_C": -5.0}, "(T + 5) / 40"), ({}, "(T - 20) / 40")])
 def test_laws_count_temperature_from_the_scenes_reference(told, counted, tmp_path):
-    """What falls in proportion to the distance from there falls by nothing there, so that no constant is left over; older answers count from 20 C."""
+    """What falls in proportion to the distance from there falls by nothing there, so that no
+    constant is left over; older answers count from 20 C."""
     zero = told.get("reference_temperature_C", 20.0)
     rows = [{"temperature_C": t, "speed_rpm": 0.0, "relative": np.expm1(-0.002 * (t - zero)), "sd": 0.001} for t in (zero, 28.0, 36.0, 44.0, 52.0, 60.0)]
     (tmp_path / "d.json").write_text(json.dumps({"where": [{"element": "preload", "unit": "%", "change": rows}], **told}), encoding="utf-8")

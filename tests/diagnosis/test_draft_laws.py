@@ -29,8 +29,8 @@ PUT_IN |= {f"{name}, and a constant": shape for name, shape in PUT_IN.items() if
 
 @pytest.mark.parametrize("name", PUT_IN)
 def test_a_law_that_was_put_in_comes_out(name):
-    """As the best by the criterion or within chance of it (4), with its parameters within four of their errors; of a step the two tests between which
-    it lies. Laws that cannot be it are left behind."""
+    """As the best by the criterion or within chance of it (4), with its parameters within four of their
+    errors; of a step the two tests between which it lies. Laws that cannot be it are left behind."""
     every = {law.name: law for law in laws(TEMPERATURE, SHARE)}
     true, sd = every[name], np.full(12, 0.02)
     offset = -0.0625 if true.has_offset else 0.0
@@ -58,8 +58,8 @@ def test_no_more_parameters_than_tests():
 
 
 def test_tests_of_one_temperature_are_one_place_of_a_law_of_temperature():
-    """A root over 20, 40 and 60 C at two speeds: a sigmoid's three parameters meet three temperatures whatever is there, and where 40 and 60 C alone were known it went on flat (campaign 2705 of
-    the blind study); the root meets them too, with one to spare."""
+    """A root over 20, 40 and 60 C at two speeds: a sigmoid's three parameters meet three temperatures whatever is there, and where
+    40 and 60 C alone were known it went on flat (campaign 2705 of the blind study); the root meets them too, with one to spare."""
     at, share, sd = np.tile([20.0, 40.0, 60.0], 2), np.repeat([0.0, 1.0], 3), 0.02
     change = -5.0 * ((at - 20) / 40) ** 0.72 + sd * np.random.default_rng(1).standard_normal(6)
     found = ranked([f for law in laws(at, share) if (f := fit_law(law, at, share, change, np.eye(6) / sd)) is not None])

@@ -1,4 +1,5 @@
-"""Diagnoses of the machine-tool spindle: its virtual campaigns from all points, and from the FRF of the nose to itself alone. Minutes each: `-m slow`."""
+"""Diagnoses of the machine-tool spindle: its virtual campaigns from all points, and from the FRF of
+the nose to itself alone. Minutes each: `-m slow`."""
 
 from __future__ import annotations
 

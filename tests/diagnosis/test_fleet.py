@@ -13,7 +13,8 @@ def mode(number, measured, computed, damping=None):
 
 
 def test_errors_of_a_mode_are_means_of_its_tests_in_per_cent():
-    """10 Hz of 1000 and -100 of 2000 are 1 and -5 %; a damping ratio of 0.02 computed is as large as one measured, and a quarter larger than another."""
+    """10 Hz of 1000 and -100 of 2000 are 1 and -5 %; a damping ratio of 0.02 computed is as large
+    as one measured, and a quarter larger than another."""
     first = SimpleNamespace(modes=(mode(1, 1000.0, 1010.0, 0.02), mode(3, 400.0, 402.0)), missing=(5.0,), extra=())
     second = SimpleNamespace(modes=(mode(1, 2000.0, 1900.0, 0.016),), missing=(), extra=(6.0, 7.0))
     row = _compared(SimpleNamespace(tests=(first, second), rms_residual=float("inf")))

@@ -1,4 +1,5 @@
-"""From a laboratory's own files to a verdict: imported as a user would, diagnosed by the verb, on FRFs whose lines and noise are not the program's own."""
+"""From a laboratory's own files to a verdict: imported as a user would, diagnosed by the verb, on
+FRFs whose lines and noise are not the program's own."""
 
 from __future__ import annotations
 
@@ -43,7 +44,8 @@ def exact(spindle: Spindle, frequency: Array, seed: int, tests: Sequence[tuple[f
 
 
 def written(folder: Path, frequency: Array, measured: Sequence[ComplexArray], unit: str, tests: Sequence[tuple[float, float]]) -> Path:
-    """Text files of a laboratory, one a test, and the mapping that tells what they do not; the campaign that `spindle import` makes of them."""
+    """Text files of a laboratory, one a test, and the mapping that tells what they do not; the
+    campaign that `spindle import` makes of them."""
     mapping = 'spindle = "hdd_2003"\n'
     for k, ((temperature, rpm), value) in enumerate(zip(tests, measured, strict=True)):
         heads, columns = ["Frequency [Hz]"], [frequency]
@@ -103,7 +105,8 @@ def test_a_hub_that_lags_is_named_from_their_files(
 
 
 def test_lines_of_the_running_speed_are_said_and_cost_nothing(spindle: Spindle, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Unbalance stands at multiples of the speed in the FRFs of one test: the verb names them and the test, and the verdict is as if they were not."""
+    """Unbalance stands at multiples of the speed in the FRFs of one test: the verb names them and
+    the test, and the verdict is as if they were not."""
     lag = by_name("soak_lag")
     monkeypatch.setattr(verb, "with_effects", lambda scene, files: (spindle, (lag,)))
     tests = ((20.0, 0.0), (60.0, 7200.0))

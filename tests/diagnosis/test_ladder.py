@@ -323,7 +323,8 @@ def test_json_of_the_command(capsys, tmp_path):
 
 
 def test_frequencies_that_get_worse_are_said_to(lagging):
-    """Granting a constant error took the error of a beam's FRFs from 89 to 51, and that of its frequencies from 1.72 to 18.73 Hz, without a word."""
+    """Granting a constant error took the error of a beam's FRFs from 89 to 51, and that of its
+    frequencies from 1.72 to 18.73 Hz, without a word."""
     r = lagging.step(DISCREPANCY)
     learned = replace(r.fitted.learned, sizes={**r.fitted.learned.sizes, kinds_of.STIFFNESS: 1e-3})
     worse = replace(r, rms_Hz=18.73, error=0.5 * lagging.step(TOLERANCES).error, fitted=replace(r.fitted, learned=learned))

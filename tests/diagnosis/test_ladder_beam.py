@@ -46,9 +46,10 @@ def test_what_says_nothing_is_left_out(shaft):
 
 
 def test_the_error_falls_on_modes_left_out(shaft):
-    """Euler-Bernoulli, rotary inertia, shear, accelerometer mass: the error of all data and that of each mode predicted from the other three. It was "-" for every fit,
-    and the error went 0.06, 0.51, 0.27 on top of a constant error of every frequency. What is below the measurement's own errors, per cent tell nothing of: a mass of the sensor that is not established
-    takes 0.019 % to 0.023 %, or leaves it, as the machine rounds the tie of two prior widths."""
+    """Euler-Bernoulli, rotary inertia, shear, accelerometer mass: the error of all data and that of each mode predicted
+    from the other three. It was "-" for every fit, and the error went 0.06, 0.51, 0.27 on top of a constant error of
+    every frequency. What is below the measurement's own errors, per cent tell nothing of: a mass of the sensor that is
+    not established takes 0.019 % to 0.023 %, or leaves it, as the machine rounds the tie of two prior widths."""
     names = [TOLERANCES, *(f"+ {name}" for name in BEAM)]
     climbed = [shaft.step(name) for name in names]
     assert [r.above for r in climbed[1:]] == names[:-1]
@@ -75,7 +76,8 @@ def test_the_error_falls_on_modes_left_out(shaft):
 
 
 def test_a_mode_left_out_is_not_in_the_fit_that_predicts_it(shaft):
-    """Its frequency wrong by a hundredth leaves the fit to the others as it was, to the last bit; nor is its shape in it, whose 8 numbers (9 points) are predicted too."""
+    """Its frequency wrong by a hundredth leaves the fit to the others as it was, to the last bit;
+    nor is its shape in it, whose 8 numbers (9 points) are predicted too."""
     model = without(shaft.model, CONSTANT)
     [table] = model.tests
     wrong = replace(model, tests=(replace(table, frequency=table.frequency * [1.0, 1.01, 1.0, 1.0]),))
@@ -105,7 +107,8 @@ def test_two_planes_of_a_shaft_are_left_out_together(shaft):
 
 
 def test_a_diagnosis_is_not_contradicted(shaft):
-    """It said "shear is not established" and then "Diagnosis: identified": where a step falls short of what is asked of one alone, and the diagnosis names it, that is said."""
+    """It said "shear is not established" and then "Diagnosis: identified": where a step falls short
+    of what is asked of one alone, and the diagnosis names it, that is said."""
     sheared = shaft.step("+ shear")
     short = replace(sheared, evidence=shaft.step("+ rotary_inertia").evidence + 11.0)
     behind = replace(shaft.step(DISCREPANCY), evidence=short.evidence - 5.0)

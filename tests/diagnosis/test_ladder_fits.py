@@ -50,8 +50,9 @@ def test_a_temperature_left_out_is_not_in_the_fit_that_predicts_it(spindle):
 
 
 def test_what_is_missed_is_no_difference_of_large_numbers():
-    """A reversed sensor puts a test 4e5 standard errors off, nearly all within reach of wide priors: as a difference of squares that came out negative, and its root was none.
-    In closed form, of columns c q with q orthonormal: what is across them, and |p|^2 / (1 + c^2) of p along them."""
+    """A reversed sensor puts a test 4e5 standard errors off, nearly all within reach of wide priors:
+    as a difference of squares that came out negative, and its root was none. In closed form, of
+    columns c q with q orthonormal: what is across them, and |p|^2 / (1 + c^2) of p along them."""
     random = np.random.default_rng(4)
     q = np.linalg.qr(random.normal(size=(500, 21)))[0]
     along, reach, across = 1e7 * random.normal(size=20), np.logspace(4, 8, 20), 3.0
@@ -60,7 +61,8 @@ def test_what_is_missed_is_no_difference_of_large_numbers():
 
 
 def test_a_mean_where_no_spindle_can_be_built_predicts_nothing(spindle):
-    """Laws from 20 to 60 C, tests at both ends: a learned mean that has the chamber at 19.7 C is none to predict the other test from; the fit itself serves."""
+    """Laws from 20 to 60 C, tests at both ends: a learned mean that has the chamber at 19.7 C is
+    none to predict the other test from; the fit itself serves."""
     steel = spindle.materials["steel"]
     ending = replace(steel, thermal_expansion=Law((20.0, 60.0), (11.5e-6, 11.5e-6)))
     measured = replace(spindle, materials={**spindle.materials, "steel": ending})

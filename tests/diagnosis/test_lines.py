@@ -39,7 +39,8 @@ def test_what_was_put_in_comes_out_within_its_errors(spindle):
 
 
 def test_errors_under_a_window_come_true(spindle):
-    """Noise under a window that ends at 5 %, correlated from line to line, 24 draws: scores as they must be, where lines taken for independent would say less."""
+    """Noise under a window that ends at 5 %, correlated from line to line, 24 draws: scores as they
+    must be, where lines taken for independent would say less."""
     free, decay, step = parameters(spindle), 20.0, 1 / 0.15
     frequency = step * np.arange(60, 451)
     exact = operating_point(spindle, Condition(40.0)).frf(frequency, decay)

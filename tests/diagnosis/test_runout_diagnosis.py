@@ -121,7 +121,8 @@ def heavy_cage(spindle) -> tuple[Campaign, RunoutDiagnosis]:
 
 
 def test_with_one_speed_the_cage_and_the_balls_are_not_told_apart_for_certain(spindle, heavy_cage) -> None:
-    """Both whirl the hub at fc; only speed tells them apart, and the balls' size is the likelier: a cage so heavy is 30 of its standard deviations."""
+    """Both whirl the hub at fc; only speed tells them apart, and the balls' size is the likelier: a
+    cage so heavy is 30 of its standard deviations."""
     made, d = heavy_cage
     assert d.verdict == "ambiguous", d.reason
     assert set(d.effects) == {"ball_size", "cage_unbalance"}

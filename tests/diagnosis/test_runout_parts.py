@@ -1,4 +1,5 @@
-"""Runout tests of machines whose parts turn at speeds of their own, and of one whose bearings are numbers: lines, what repeats, and what is named."""
+"""Runout tests of machines whose parts turn at speeds of their own, and of one whose bearings are
+numbers: lines, what repeats, and what is named."""
 
 from dataclasses import replace
 
@@ -172,7 +173,8 @@ def test_every_bearing_of_a_scene_is_looked_at():
 
 
 def test_what_leaks_from_lines_that_are_fitted_as_one_is_no_line_of_another():
-    """Lines of several bearings stand half a bin apart: what their sum leaves at a line along the axis, seen across it, is within its error."""
+    """Lines of several bearings stand half a bin apart: what their sum leaves at a line along the
+    axis, seen across it, is within its error."""
     spindle = load(SCENES / "five_bearing")
     made = runout_campaign(spindle, [Condition(20.0, s * RPM) for s in (4000, 8000)], 0.6, path="linear")
     along = np.array([abs(p.direction[2]) > 0.5 for p in made.points])
@@ -188,7 +190,8 @@ def test_what_leaks_from_lines_that_are_fitted_as_one_is_no_line_of_another():
 
 
 def test_an_effect_that_does_nothing_gains_nothing_by_moving_several_families():
-    """Lines of one effect are fitted together and share the build's tolerances, which they do without it too: 9 in ln evidence were counted for it."""
+    """Lines of one effect are fitted together and share the build's tolerances, which they do
+    without it too: 9 in ln evidence were counted for it."""
     spindle = load(SCENES / "five_bearing")
     made = runout_campaign(spindle, [Condition(20.0, s * RPM) for s in (4000, 6000, 8000)], 0.6, path="linear")
     seen = [look(spindle, t) for t in made.tests]

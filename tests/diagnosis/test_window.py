@@ -87,8 +87,9 @@ def test_errors_of_compressed_lines_come_true(hidden):
     ids=["new in every line", "hit at the start, untold", "hit at the start", "hit a little later, untold", "hit later, untold", "hit later", "hit a little later than told"],
 )
 def test_errors_of_what_is_smooth_over_lines_come_true(hidden, before, told, without):
-    """A gain, a delay and a mode's frequency fitted to windowed noise are off by their stated errors, within a fifth, where lines taken for independent would say half as much. Hit late in a record
-    the noise of an FRF turns from line to line; a little later than is told does no harm, and much later lines say by themselves. Where the time is told, chi2 is right too."""
+    """A gain, a delay and a mode's frequency fitted to windowed noise are off by their stated errors, within a fifth, where
+    lines taken for independent would say half as much. Hit late in a record the noise of an FRF turns from line to line; a
+    little later than is told does no harm, and much later lines say by themselves. Where the time is told, chi2 is right too."""
     frequency, off, alone, chi2 = LINES[USE], [], [], []
     smooth = modal_frf(frequency)
     for seed in range(10):
@@ -127,8 +128,8 @@ def test_lines_by_themselves():
     [(113, None), (165, 0.0), pytest.param(165, None, marks=pytest.mark.xfail(strict=True, reason="where it is not told how long before the hit records begin, errors cover a later one: rms 0.75 to 0.78 of them"))],
 )
 def test_noise_under_a_window_is_that_of_all_tests(seed, told):
-    """Blind campaigns 113 and 165, as they are or told that records begin with the hit: the same noise in every test. A fit of it that let one block rule the next told a tenth of it in one test, and that was missed
-    by six standard errors and more."""
+    """Blind campaigns 113 and 165, as they are or told that records begin with the hit: the same noise in every test. A fit of
+    it that let one block rule the next told a tenth of it in one test, and that was missed by six standard errors and more."""
     drawn = draw(seed)
     made = drawn.made().campaign
     model = campaign_data(drawn.spindle, replace(made, tests=tuple(replace(t, pretrigger=told) for t in made.tests)))

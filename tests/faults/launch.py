@@ -2,9 +2,9 @@
 
     python -m tests.faults.launch FOLDER N COUNT VERB ...      N = 0: never; how many acts there were is written to the file COUNT
 
-With N = -1 it lives, and copies the folder to COUNT.copies/K before its K-th act: what a SIGKILL there would leave, for every K of one run.
-An act is what the interpreter's audit hooks tell: a file opened to be written, a folder made, something renamed or removed. `save` is no verb of
-the command line but the workbench's: SCENE CAMPAIGN OUT.
+With N = -1 it lives, and copies the folder to COUNT.copies/K before its K-th act: what a SIGKILL there would leave,
+for every K of one run. An act is what the interpreter's audit hooks tell: a file opened to be written, a folder
+made, something renamed or removed. `save` is no verb of the command line but the workbench's: SCENE CAMPAIGN OUT.
 """
 
 from __future__ import annotations

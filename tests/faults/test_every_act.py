@@ -1,7 +1,9 @@
-"""What a SIGKILL would leave at many moments of one run: copies of its folder as it goes, since what takes minutes cannot be killed a hundred times.
+"""What a SIGKILL would leave at many moments of one run: copies of its folder as it goes, since
+what takes minutes cannot be killed a hundred times.
 
-Before every act on its files the run makes one itself (`launch`); between them, amid what compiled libraries write, it is stopped (SIGSTOP) at random
-moments while its folder is copied. Both leave what SIGKILL leaves: all that was written so far, and nothing of what the process still holds. `test_kills` kills.
+Before every act on its files the run makes one itself (`launch`); between them, amid what compiled libraries
+write, it is stopped (SIGSTOP) at random moments while its folder is copied. Both leave what SIGKILL leaves:
+all that was written so far, and nothing of what the process still holds. `test_kills` kills.
 """
 
 import os

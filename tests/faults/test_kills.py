@@ -1,4 +1,5 @@
-"""kill -9 at any moment of every verb that writes: what was there stays whole, or what is new is; the next run works and leaves nothing lying about."""
+"""kill -9 at any moment of every verb that writes: what was there stays whole, or what is new is;
+the next run works and leaves nothing lying about."""
 
 import os
 import shutil

@@ -2,8 +2,9 @@
 
     python -m tests.fuzz [NAME ...] [--seconds 60] [--keep]
 
-Begins with the whole files of `tests/torture/readers.py` (their first `LONGEST` bytes), the corpus, and what earlier runs found. With `--keep` the corpus is made anew: of all
-inputs the smallest that reach everything, up to `MOST` bytes a reader. Exit code 1 where anything was found.
+Begins with the whole files of `tests/torture/readers.py` (their first `LONGEST` bytes), the corpus,
+and what earlier runs found. With `--keep` the corpus is made anew: of all inputs the smallest that
+reach everything, up to `MOST` bytes a reader. Exit code 1 where anything was found.
 """
 
 from __future__ import annotations

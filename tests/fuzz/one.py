@@ -1,4 +1,5 @@
-"""One reader under atheris: `python -m tests.fuzz.one NAME [options of libFuzzer] FOLDER ...`, or with FILE instead of folders to try it again."""
+"""One reader under atheris: `python -m tests.fuzz.one NAME [options of libFuzzer] FOLDER ...`, or
+with FILE instead of folders to try it again."""
 
 from __future__ import annotations
 
@@ -35,7 +36,8 @@ with atheris.instrument_imports(include=["thermospindle", *LIBRARIES], exclude=o
 
 
 def mutated(data: bytes, most: int, seed: int) -> bytes:
-    """Every other time bytes as libFuzzer moves them, else numbers, lines and pieces as `damage` does: text seldom stays text under the first."""
+    """Every other time bytes as libFuzzer moves them, else numbers, lines and pieces as `damage`
+    does: text seldom stays text under the first."""
     rng = random.Random(seed)
     if rng.random() < 0.5:
         return atheris.Mutate(data, most)

@@ -1,4 +1,5 @@
-"""The input of CalculiX (`ccx`, GPL-2, https://www.calculix.de, a Debian package) for the free bending of a stepped hollow shaft, as a solid.
+"""The input of CalculiX (`ccx`, GPL-2, https://www.calculix.de, a Debian package) for the free
+bending of a stepped hollow shaft, as a solid.
 
 A quarter of the shaft in bricks of 20 nodes (C3D20R): bending along x is symmetric about the plane y = 0 and antisymmetric about x = 0. Two
 motions of it are rigid, and come out as frequencies of nearly nothing.

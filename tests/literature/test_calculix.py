@@ -1,8 +1,8 @@
-"""Free bending of the shipped stepped shafts against solid finite elements: numbers of CalculiX 2.20 (Debian bookworm's calculix-ccx 2.20-1), whose
-input `tests.literature.calculix` writes; where `ccx` is on the path, it is run again.
+"""Free bending of the shipped stepped shafts against solid finite elements: numbers of CalculiX 2.20 (Debian bookworm's
+calculix-ccx 2.20-1), whose input `tests.literature.calculix` writes; where `ccx` is on the path, it is run again.
 
-A beam is in doubt where a shaft steps: a short collar does not bend as wide as it is. Timoshenko's beam is right to 1 % up to 4 kHz on mk7702, whose
-steps are shallow, and 1 to 6 % too stiff on five_bearing, whose nose has a collar of 133 mm on a shaft of 75 to 82 mm.
+A beam is in doubt where a shaft steps: a short collar does not bend as wide as it is. Timoshenko's beam is right to 1 % up to 4 kHz on
+mk7702, whose steps are shallow, and 1 to 6 % too stiff on five_bearing, whose nose has a collar of 133 mm on a shaft of 75 to 82 mm.
 """
 
 import shutil
@@ -62,7 +62,8 @@ def test_without_shear_a_beam_is_far_off(name):
 
 
 def test_the_input_is_the_shaft():
-    """Every node once, every element between nodes that are there, and the quarter's volume within what edges of arcs of 22.5 degrees leave."""
+    """Every node once, every element between nodes that are there, and the quarter's volume within
+    what edges of arcs of 22.5 degrees leave."""
     shaft = load("mk7702").structure.shafts[0]
     text = deck(shaft.segments, 210e9, 0.3, 7850.0, 40e-3)
     before, after = text.split("*ELEMENT, TYPE=C3D20R, ELSET=SHAFT\n")

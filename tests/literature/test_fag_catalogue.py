@@ -1,8 +1,9 @@
 """A manufacturer's catalogue of spindle bearings: preload, unloading force and axial rigidity of a back-to-back pair.
 
-Quoted: the rows of five bearings of the FAG catalogue of spindle bearings (series B70 and B72, steel balls). The whole table is not shipped; with 990
-of its bearings the same fit leaves 0.95 % rms (15 degrees) and 0.60 % (25 degrees), 2.7 % of the worst, a model with fixed contact angle 14 % and 5.5 %.
-Two unknowns a bearing: the unloaded distance of the groove centres, and balls times load-deflection constant.
+Quoted: the rows of five bearings of the FAG catalogue of spindle bearings (series B70 and B72, steel
+balls). The whole table is not shipped; with 990 of its bearings the same fit leaves 0.95 % rms (15
+degrees) and 0.60 % (25 degrees), 2.7 % of the worst, a model with fixed contact angle 14 % and 5.5 %. Two
+unknowns a bearing: the unloaded distance of the groove centres, and balls times load-deflection constant.
 """
 
 from dataclasses import replace

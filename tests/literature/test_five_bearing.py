@@ -1,7 +1,8 @@
 """The five-bearing spindle against what is printed of it, its bearings against their catalogue, and sets of them against printed factors.
 
-Printed: vshabanov/spindlecad, `src/CourseWorkSpindle.lhs` at 530f201e (151.1 N/um at the nose; 162.4 with 230.4 N/um in every front bearing), and the FAG
-catalogue "Super precision bearings", p. 176 (axial rigidity of sets over that of a pair). To more digits and with shear: an independent beam code.
+Printed: vshabanov/spindlecad, `src/CourseWorkSpindle.lhs` at 530f201e (151.1 N/um at the nose; 162.4
+with 230.4 N/um in every front bearing), and the FAG catalogue "Super precision bearings", p. 176
+(axial rigidity of sets over that of a pair). To more digits and with shear: an independent beam code.
 """
 
 import json
@@ -138,8 +139,9 @@ def mounted(five, below, above, preload):
     ("below", "above", "hertz", "printed"), [(2, 1, 1.630, 1.64), (2, 2, 2.0, 2.0), (3, 1, 2.221, 2.24), (3, 2, 2.645, 2.64)], ids=["TBT", "QBC", "QBT", "PBC"]
 )  # fmt: skip
 def test_rigidity_of_sets(five, below, above, hertz, printed):
-    """At the preload at which each row of the larger group has the pair's: sum of n (F/n)^(1/3) / 2 at constant angle, which the catalogue prints within
-    1 %; as angles rise with load, rows at a higher one are stiffer still, and ratios at 283 N up to 3 % above the printed."""
+    """At the preload at which each row of the larger group has the pair's: sum of n (F/n)^(1/3) / 2
+    at constant angle, which the catalogue prints within 1 %; as angles rise with load, rows at a
+    higher one are stiffer still, and ratios at 283 N up to 3 % above the printed."""
     pair = mounted(five, 1, 1, 20.0)
     found = mounted(five, below, above, 20.0 * below) / pair
     assert found == pytest.approx(hertz, rel=0.01)

@@ -1,7 +1,7 @@
 """The spindle of the machine tool MK7702 against the answers printed with it, and against a rotor code.
 
-Printed: vshabanov/spindlecad, `src/MK7702Spindle.lhs` at 530f201e (Euler-Bernoulli, radial springs to rigid ground). With shear and at speed: ROSS 3.1
-(Timoshenko, rotary inertia, gyroscopic terms, 57 nodes, same springs), run beside this project.
+Printed: vshabanov/spindlecad, `src/MK7702Spindle.lhs` at 530f201e (Euler-Bernoulli, radial springs to rigid ground). With
+shear and at speed: ROSS 3.1 (Timoshenko, rotary inertia, gyroscopic terms, 57 nodes, same springs), run beside this project.
 """
 
 import json
@@ -86,8 +86,9 @@ LATERAL = [706.8, 1058.6, 1558.3, 3100.7]
 
 
 def test_four_modes_at_rest(mk7702):
-    """Without the assumed damping: off by 2.6e-4 at most with masses at nodes, as MuJoCo has them, and equal to the digits given where they are spread. What `modes` prints is within
-    3e-4 as well: bearings of a damping ratio of 0.015 at 1 kHz hold the shaft by their dampers too, by which |pole| rises as much as masses at nodes lower it."""
+    """Without the assumed damping: off by 2.6e-4 at most with masses at nodes, as MuJoCo has them, and equal to the
+    digits given where they are spread. What `modes` prints is within 3e-4 as well: bearings of a damping ratio of
+    0.015 at 1 kHz hold the shaft by their dampers too, by which |pole| rises as much as masses at nodes lower it."""
     at_nodes = operating_point(undamped(mk7702), Condition(20.0))
     lumped = [m.frequency for m in at_nodes.modes_below(4000.0) if m.kind != "axial"]
     assert lumped[::2] == pytest.approx(LATERAL, rel=3e-4)
@@ -101,7 +102,8 @@ def test_four_modes_at_rest(mk7702):
 
 
 def test_what_modes_prints_tends_to_the_printed_frequencies(mk7702, tmp_path):
-    """1058.87 Hz for 1058.6: masses at nodes 20 mm apart, of which halving leaves a quarter, and 0.03 Hz of the bearings' dampers. Spread along the elements they are right on any mesh."""
+    """1058.87 Hz for 1058.6: masses at nodes 20 mm apart, of which halving leaves a quarter, and
+    0.03 Hz of the bearings' dampers. Spread along the elements they are right on any mesh."""
     text = mk7702.file.read_text(encoding="utf-8")
     at_nodes, spread = [], []
     for element in (20.0, 10.0, 5.0):

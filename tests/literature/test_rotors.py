@@ -1,10 +1,10 @@
 """Rotors whose answers others printed: Friswell's examples, Nelson and McVaugh's rotor, a spinning beam.
 
-Friswell, Penny, Garvey, Lees, Dynamics of Rotating Machines (2010): examples 5.9.1, 5.9.2, 5.9.3, 5.9.5 and 5.9.9 with the numbers that petrobras/ross
-(Apache-2.0, 631a249a) asserts in `ross/tests/test_examples.py`: natural frequencies of consistent-mass Timoshenko beams, in rad/s or Hz as there; its
-torsion (650.41 rad/s, 647.75 in 5.9.9) is left out, which these models do not have; example 5.9.4 has bearings that are not symmetric, which no scene has.
-Nelson, McVaugh, The dynamics of rotor-bearing systems using finite elements, J. Eng. Ind. 98 (1976): the rotor, with the numbers of an
-independent beam code for it; what is quoted of the paper itself differs by up to 1.4 %.
+Friswell, Penny, Garvey, Lees, Dynamics of Rotating Machines (2010): examples 5.9.1, 5.9.2, 5.9.3, 5.9.5 and 5.9.9 with the numbers that
+petrobras/ross (Apache-2.0, 631a249a) asserts in `ross/tests/test_examples.py`: natural frequencies of consistent-mass Timoshenko beams,
+in rad/s or Hz as there; its torsion (650.41 rad/s, 647.75 in 5.9.9) is left out, which these models do not have; example 5.9.4 has
+bearings that are not symmetric, which no scene has. Nelson, McVaugh, The dynamics of rotor-bearing systems using finite elements, J. Eng.
+Ind. 98 (1976): the rotor, with the numbers of an independent beam code for it; what is quoted of the paper itself differs by up to 1.4 %.
 """
 
 from __future__ import annotations
@@ -194,8 +194,8 @@ def test_nelson_critical_speeds(nelson: Spindle, shares: tuple[float, float], ex
 
 
 def test_a_spinning_beam_splits_as_its_closed_form() -> None:
-    """A pinned Rayleigh beam of circular section that spins at W: w^2 (1 + r^2 n^2) - 2 r^2 n^2 W w - w0^2 = 0, with n = pi / L, radius of gyration r
-    = d / 4, and w0^2 = E I n^4 / (rho A): forward and backward whirl (Genta, Dynamics of Rotating Systems, 2005, 5.2)."""
+    """A pinned Rayleigh beam of circular section that spins at W: w^2 (1 + r^2 n^2) - 2 r^2 n^2 W w - w0^2 = 0, with n = pi / L, radius
+    of gyration r = d / 4, and w0^2 = E I n^4 / (rho A): forward and backward whirl (Genta, Dynamics of Rotating Systems, 2005, 5.2)."""
     length, d, young, density = 1.0, 0.1, 210e9, 7850.0
     spindle = rotor((210.0, 0.3, density), [(1e3 * d, 1e3 * length)], [], [], [(0.0, 1e13, 1e13), (1e3 * length, 1e13, 1e13)], longest=10.0)
     spindle = replace(spindle, structure=with_theory(spindle.structure, spindle.materials, 20.0, (0.0, 1.0)))

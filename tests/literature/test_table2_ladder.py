@@ -29,8 +29,8 @@ def test_fixed_stiffness_misses_every_shift_whole(climbed):
 
 
 def test_axial_equilibrium_misses_the_shifts_as_the_papers_own_analysis_does(climbed):
-    """The paper's analysis misses its measured shifts by 4.3 Hz rms; printed in whole Hz. Mode 3, whose seat is assumed, misses 4 Hz more. Of the mean
-    square of the shifts the paper's analysis leaves 5 %, ours, whose section is assumed, less than 10 %."""
+    """The paper's analysis misses its measured shifts by 4.3 Hz rms; printed in whole Hz. Mode 3, whose seat is assumed, misses
+    4 Hz more. Of the mean square of the shifts the paper's analysis leaves 5 %, ours, whose section is assumed, less than 10 %."""
     assert climbed.step("axial equilibrium").rms_shift_Hz == pytest.approx(rms(ANALYSED - MEASURED), abs=1.4)
     assert climbed.step("axial equilibrium").rms_shift_Hz ** 2 < 0.1 * climbed.step("fixed stiffness").rms_shift_Hz ** 2
 
@@ -57,8 +57,8 @@ def test_what_is_left_over(climbed):
 
 
 def test_ten_numbers_carry_no_more_than_they_can(climbed):
-    """Tolerances alone, the flange's unevenness among them, buy a fit with some of them where they are not believed; granted that the model is a hundredth wrong
-    everywhere, they stay where they are, and most of what the data tell has gone into offsets."""
+    """Tolerances alone, the flange's unevenness among them, buy a fit with some of them where they are not believed; granted that
+    the model is a hundredth wrong everywhere, they stay where they are, and most of what the data tell has gone into offsets."""
     strict, top = climbed.step(TOLERANCES), climbed.step(DISCREPANCY)
     assert top is climbed.top
     assert strict.error > 1.8

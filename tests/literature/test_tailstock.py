@@ -1,5 +1,6 @@
-"""The tailstock spindle, on cylindrical rollers in front: Palmgren's deflection of a line contact, the nose by the force method over the shaft's
-drawing (Castigliano: bending and shear integrals, no elements), Lame's rings for the clearance over temperature, and what verbs say of rollers."""
+"""The tailstock spindle, on cylindrical rollers in front: Palmgren's deflection of a line contact,
+the nose by the force method over the shaft's drawing (Castigliano: bending and shear integrals, no
+elements), Lame's rings for the clearance over temperature, and what verbs say of rollers."""
 
 import csv
 import json
@@ -50,8 +51,9 @@ def cold(tail):
 
 @pytest.mark.parametrize("load_N", [500.0, 2000.0, 8000.0])
 def test_the_rollers_give_as_palmgren_has_it(tail, load_N):
-    """Without clearance the most loaded roller of Z i carries 4.08 F / (Z i), and the shaft moves by 7.68e-5 Q^0.9 / l^0.8 mm (Harris, Rolling Bearing
-    Analysis, 4th ed., Eqs. 7.24 and 8.5: 3.84e-5 a contact), which is within 5 % of the standard's that the program computes with."""
+    """Without clearance the most loaded roller of Z i carries 4.08 F / (Z i), and the shaft moves
+    by 7.68e-5 Q^0.9 / l^0.8 mm (Harris, Rolling Bearing Analysis, 4th ed., Eqs. 7.24 and 8.5:
+    3.84e-5 a contact), which is within 5 % of the standard's that the program computes with."""
     [bearing] = tail.roller_bearings
     row = roller_row(tail, replace(bearing, clearance=0.0), None, 20.0)
     most = 4.08 * load_N / (26 * 2)
@@ -60,15 +62,16 @@ def test_the_rollers_give_as_palmgren_has_it(tail, load_N):
 
 
 def press_fit_stiffness(interference_um: float) -> tuple[float, float]:
-    """Radial (N/m) and tilting (N m/rad) stiffness of two rows of 26 rollers, each pressed by half the interference: 26 n c d^(1/9), n = 10/9."""
+    """Radial (N/m) and tilting (N m/rad) stiffness of two rows of 26 rollers, each pressed by half
+    the interference: 26 n c d^(1/9), n = 10/9."""
     constant = 35_948 * 8.2 ** (8 / 9) * 1e3 ** (10 / 9) * STEEL / 206e9
     radial = 26 * 10 / 9 * constant * (interference_um * 1e-6 / 2) ** (1 / 9)
     return radial, radial * (8.2e-3**2 / 12 + 12e-3**2 / 4)
 
 
 def test_the_races_give_as_lames_rings_do(tail, cold):
-    """What 1 N of all contact loads, spread over the 30 mm of the rings, widens the outer race and narrows the inner one by; and the clearance at which
-    the rollers' load is what keeps the races that far apart."""
+    """What 1 N of all contact loads, spread over the 30 mm of the rings, widens the outer race and narrows
+    the inner one by; and the clearance at which the rollers' load is what keeps the races that far apart."""
     [bearing] = tail.roller_bearings
     inner = 0.041 / STEEL * ((0.041**2 + 0.022**2) / (0.041**2 - 0.022**2) - NU)
     a, b, c = 0.050, 0.055, 0.075
@@ -97,7 +100,8 @@ def sections() -> list[tuple[float, float, float]]:
 
 
 def compliance_by_forces(springs: list[tuple[float, np.ndarray]]) -> float:
-    """Motion of the nose (m) by 1 N there, of the shaft on springs (z, (2, 2) of x and tilt): loads at the springs unknown, the shaft held at its end."""
+    """Motion of the nose (m) by 1 N there, of the shaft on springs (z, (2, 2) of x and tilt): loads
+    at the springs unknown, the shaft held at its end."""
     loads = [(0.0, 0), *((z, kind) for z, _ in springs for kind in (0, 1))]  # a force, or a moment, at z
     flexibility, start = np.zeros((len(loads), len(loads))), 0.0
     for end, bending, shearing in sections():
@@ -150,15 +154,16 @@ def test_the_clearance_of_rollers_is_a_tolerance(stiff):
 @pytest.mark.slow
 @pytest.mark.parametrize(("standing", "alpha"), [("steel", ALPHA), ("cast iron", ALPHA_IRON)])
 def test_the_clearance_of_whole_parts_over_temperature(stiff, standing, alpha):
-    """What turns is one steel and what stands one material: every radius grows by its own alpha dT, 50 mm outside, 41 and twice 4.5 mm inside."""
+    """What turns is one steel and what stands one material: every radius grows by its own alpha dT,
+    50 mm outside, 41 and twice 4.5 mm inside."""
     regions = tuple(replace(g, material=standing if g.part == "stationary" else g.material) for g in stiff.regions)
     warm = operating_point(replace(stiff, regions=regions), Condition(60.0)).state.any_bearing("front1")
     assert warm.clearance == pytest.approx(-2.5e-6 + 2 * 40.0 * 0.050 * (alpha - ALPHA), abs=1e-9)
 
 
 def test_the_clearance_over_temperature_lies_between_lames(stiff):
-    """The steel outer ring, 50 to 55 mm, in a barrel of iron to 75 mm that grows less: the pressure between them by Lame (plane stress), of a barrel
-    as long as the ring and of a rigid one. The drawn barrel is longer than the ring."""
+    """The steel outer ring, 50 to 55 mm, in a barrel of iron to 75 mm that grows less: the pressure between them by
+    Lame (plane stress), of a barrel as long as the ring and of a rigid one. The drawn barrel is longer than the ring."""
     warm, dT = operating_point(stiff, Condition(60.0)).state.any_bearing("front1"), 40.0
     a, b, c = 0.050, 0.055, 0.075
     ring = b / STEEL * ((b**2 + a**2) / (b**2 - a**2) - NU)  # m a Pa, of the ring's outside inward
@@ -200,8 +205,8 @@ def heated(tail, rpm):
 
 
 def test_at_the_printed_most_speed_there_is_a_steady_state(tail):
-    """3500 rpm are printed as the most. Loads put in for the loads they heat up, round by round, come nearer by the same share each time, which is
-    what comes back of a load; the sum of that series is the steady state. All heat that is made goes out there."""
+    """3500 rpm are printed as the most. Loads put in for the loads they heat up, round by round, come nearer by the same share each
+    time, which is what comes back of a load; the sum of that series is the steady state. All heat that is made goes out there."""
     model, drive = heated(tail, 3500)
     field = heat.settled(model, drive, 20.0)
     nodal = model.nodal(field)

@@ -152,8 +152,8 @@ def test_forces_on_a_heavy_ball_balance():
 
 
 def on_inner(bearing: BallRow, moved: np.ndarray, cage: float | None = None) -> tuple[np.ndarray, float]:
-    """Force (2,) across the axis on the inner ring, from Harris's equations ball by ball (1991, ch. 8 and 9, outer-race control, the outer ring still), with angles and a root finder, and the mean
-    speed of the balls; each at its own speed or at that of a `cage`."""
+    """Force (2,) across the axis on the inner ring, from Harris's equations ball by ball (1991, ch. 8 and 9, outer-race control, the
+    outer ring still), with angles and a root finder, and the mean speed of the balls; each at its own speed or at that of a `cage`."""
     inertia = bearing.inertia
     diameter, gamma = inertia.diameter, inertia.diameter / inertia.pitch_diameter
     force, speeds = np.zeros(2), []
@@ -186,8 +186,8 @@ def on_inner(bearing: BallRow, moved: np.ndarray, cage: float | None = None) -> 
 
 
 def test_radial_stiffness_at_speed_is_that_of_harris_equations_with_one_cage():
-    """218 bearing at speed, 17.8 kN: of the inner ring 184 N/um with the cage's speed, 172 with each ball at its own, for which what the outer ring feels is 156: one ring cannot be pushed
-    by less than the other."""
+    """218 bearing at speed, 17.8 kN: of the inner ring 184 N/um with the cage's speed, 172 with each ball at
+    its own, for which what the outer ring feels is 156: one ring cannot be pushed by less than the other."""
     bearing = fast_218()
     centred = displacement_under(bearing, np.array([0, 0, 17800.0, 0, 0]))
     cage, aside = on_inner(bearing, centred)[1], 1e-7 * np.eye(5)[0]
@@ -199,7 +199,8 @@ def test_radial_stiffness_at_speed_is_that_of_harris_equations_with_one_cage():
 
 @pytest.mark.parametrize("aside", [0.0, 500.0])
 def test_stiffness_with_each_ball_on_its_own_orbit(aside):
-    """Against differences of what balls that know of no cage press on the outer ring: 156 N/um of the one above where rings are centred. Nothing of balls without inertia, or of a cage that is held."""
+    """Against differences of what balls that know of no cage press on the outer ring: 156 N/um of the
+    one above where rings are centred. Nothing of balls without inertia, or of a cage that is held."""
     bearing = fast_218()
     moved = displacement_under(bearing, np.array([aside, 0, 17800.0, 0, 0]))
 

@@ -70,8 +70,8 @@ def test_euler_bernoulli_frequencies_and_their_rate(end):
 
 
 def timoshenko_free(length, radius, count):
-    """First `count` frequencies (Hz) of a free uniform Timoshenko beam: Han, Benaroya, Wei, J. Sound Vib. 225 (1999) 935, from the differential
-    equations as a boundary value problem: the transfer matrix over the length leaves no force and moment at the far end."""
+    """First `count` frequencies (Hz) of a free uniform Timoshenko beam: Han, Benaroya, Wei, J. Sound Vib. 225 (1999) 935, from the
+    differential equations as a boundary value problem: the transfer matrix over the length leaves no force and moment at the far end."""
     area, inertia = np.pi * radius**2, np.pi * radius**4 / 4
     shear = shear_factor(0.0, NU) * E / (2 * (1 + NU)) * area
 
@@ -118,7 +118,8 @@ def test_a_cone_in_one_element():
 
 
 def test_nodes_have_the_shafts_mass_and_inertia():
-    """Mass, centre and polar inertia are those of the drawing, and the transverse one to the square of the element's length over the shaft's."""
+    """Mass, centre and polar inertia are those of the drawing, and the transverse one to the square
+    of the element's length over the shaft's."""
     s = shaft(0.4, (0.03, 0.03), (0.01, 0.01), count=10, rotary=1.0)
     bodies = nodes(s, STEEL)
     m = RHO * np.pi * (0.03**2 - 0.01**2) * 0.4
@@ -157,7 +158,8 @@ def test_a_force_on_what_nothing_holds_has_no_static_answer():
 
 
 def two_metals(**keys):
-    """The shipped free shaft in two pieces, 500 mm of steel and 800 mm of a metal half as heavy and a third as stiff, in elements over which that change lies."""
+    """The shipped free shaft in two pieces, 500 mm of steel and 800 mm of a metal half as heavy and
+    a third as stiff, in elements over which that change lies."""
     path = ROOT / "scenes" / "free_shaft" / "spindle.toml"
     raw = tomllib.loads(path.read_text(encoding="utf-8"))
     raw["materials"]["light"] = raw["materials"]["steel"] | {"youngs_modulus_GPa": 69.0, "density_kg_per_m3": 3925.0}
@@ -170,7 +172,8 @@ def two_metals(**keys):
 
 
 def test_each_piece_of_a_shaft_has_its_material():
-    """Mass, and the bending of the middle element, 400 mm of steel and 700 mm of the other, by sums over the pieces: one material a shaft was all that a scene could say."""
+    """Mass, and the bending of the middle element, 400 mm of steel and 700 mm of the other, by sums
+    over the pieces: one material a shaft was all that a scene could say."""
     spindle = two_metals()
     area, moment = np.pi / 4 * 0.04**2, np.pi / 64 * 0.04**4
     assert sum(b.mass for b in spindle.structure.bodies) == pytest.approx(area * (7850.0 * 0.5 + 3925.0 * 0.8), rel=1e-12)

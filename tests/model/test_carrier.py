@@ -1,6 +1,7 @@
 """Which of several turning parts an unbalance or a radial load acts on: told by the scene or by its drawing, never by the mesh.
 
-A shaft from 0 to 400 mm, a sleeve about it from 100 to 300 mm that turns against it at half its speed, and a disc given by its mass at 350 mm.
+A shaft from 0 to 400 mm, a sleeve about it from 100 to 300 mm that turns against it at half its
+speed, and a disc given by its mass at 350 mm.
 """
 
 from dataclasses import replace

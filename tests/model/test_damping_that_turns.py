@@ -26,7 +26,8 @@ def rotor(tmp_path, rpm, loss=False) -> RotorBase:
 
 
 def exact(chain: RotorBase, near: complex) -> float:
-    """Damping ratio of the pole nearest one, of the problem with the circulatory matrix of every damper between turning bodies, turned as a whole."""
+    """Damping ratio of the pole nearest one, of the problem with the circulatory matrix of every
+    damper between turning bodies, turned as a whole."""
     turning = {b.name for b in chain.bodies if b.turns}
     linear = matrices(chain)
     still = matrices(replace(chain, elements=tuple(e if e.a in turning and e.b in turning else replace(e, damping=0 * e.damping, loss_factor=0.0) for e in chain.elements), speed=0.0)).damping
@@ -55,7 +56,8 @@ def test_damping_ratio_of_what_turns(tmp_path, rpm, loss):
 
 
 def test_above_the_critical_speed_the_forward_mode_is_fed(tmp_path):
-    """Jeffcott's rotor: its bearings' share of the damping stays, and what turns is felt as 1 - w / p by the forward mode and as 1 + w / p by the backward one."""
+    """Jeffcott's rotor: its bearings' share of the damping stays, and what turns is felt as 1 - w /
+    p by the forward mode and as 1 + w / p by the backward one."""
     chain = rotor(tmp_path, 12000.0)
     found = modes(chain, highest=650.0)
     backward, forward = found[:2]

@@ -73,7 +73,8 @@ def test_free_beam_of_few_elements():
 
 @pytest.mark.parametrize("spring", [0.0, 5e9])
 def test_a_thick_beam_converges_with_the_fourth_power(spring):
-    """Free, and on a spring in its middle, at which it shears: halving elements takes 11 at least off every mode's error; lumps are of the second power."""
+    """Free, and on a spring in its middle, at which it shears: halving elements takes 11 at least
+    off every mode's error; lumps are of the second power."""
     thick = {"radius": (0.06, 0.06), "bore": (0.02, 0.02), "length": 0.6, "shear": 1.0, "rotary": 1.0}
     fine = frequencies(shaft(count=160, **thick), spring)
     errors = [np.abs(frequencies(shaft(count=n, **thick), spring) / fine - 1) for n in (10, 20, 40)]

@@ -24,8 +24,8 @@ ANGLES = [(0.1, 0.1), (0.43, 0.43), (0.9, 0.9), (0.3, 0.5), (0.62, 0.74), (0.5, 
 
 
 def written_out(inertia, outer, inner):
-    """C and M after Harris 1991, ch. 8, from how surfaces move: unknown are the cage's speed and the ball's own w about an axis at beta, which is the
-    one without spin at the outer contact. Nothing is cancelled."""
+    """C and M after Harris 1991, ch. 8, from how surfaces move: unknown are the cage's speed and the ball's
+    own w about an axis at beta, which is the one without spin at the outer contact. Nothing is cancelled."""
     radius, pitch = inertia.diameter / 2, inertia.pitch_diameter / 2
     beta = np.arctan2(np.sin(outer), np.cos(outer) + radius / pitch)
     # across the plane of ball and axis, seen from the cage: a race moves with (its speed - cage) at its radius, the ball with w r cos(a - beta)
@@ -132,7 +132,8 @@ def test_a_ball_that_does_not_settle_says_so():
 @pytest.mark.parametrize("rpm", [100, 3500, 30_000])
 @pytest.mark.parametrize(("scene", "name"), [("tailstock", "rear1"), ("hdd_2003", "upper")])
 def test_a_ball_settles_wherever_its_rings_are(scene, name, rpm):
-    """Found on `tailstock`: pressed, where what rounding does to a stiff race was more than what was allowed; loose, where steps along a circle were too many."""
+    """Found on `tailstock`: pressed, where what rounding does to a stiff race was more than what
+    was allowed; loose, where steps along a circle were too many."""
     spindle = load(scene)
     own, state = spindle.bearing(name), operating_point(spindle, Condition(20.0)).state.bearing(name)
     inertia = BallInertia(own.ball_diameter, own.pitch_diameter, spindle.materials[own.ball_material].density, rpm * RPM, 0.0)
@@ -156,14 +157,16 @@ def test_a_ball_settles_where_it_does_from_wherever_it_is_asked():
 
 
 AGAINST = BallRow(16, 311.127251846117e-6, 141.92751425103216e-6, 93e-6, 248e-6, 25.21121041899814e9, 18.9557814348371e9, 18e-3, BallInertia(6.2e-3, 36e-3, 7850.0, 2094.4, -2094.4))
-"""A row of steel balls, 25 degrees, 180 N, whose rings turn against each other with 20,000 rpm: a ball's centrifugal force is 1.9 N, the friction of its moment 1.9 N too."""
+"""A row of steel balls, 25 degrees, 180 N, whose rings turn against each other with 20,000 rpm: a
+ball's centrifugal force is 1.9 N, the friction of its moment 1.9 N too."""
 ASIDE = np.array([3e-6, -2e-6, 1e-6, 1e-4, 2e-4])
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6, 1.0])
 def test_balls_between_rings_that_turn_against_each_other(share):
-    """Halved steps ended between the races, 0.7 to 1.9 N left. Here the balance of every ball is written out (Jones 1960) with the answer's forces and angles, at the speed of the cage
-    that rolling asks for on the mean; and the contacts are where their deformations put them."""
+    """Halved steps ended between the races, 0.7 to 1.9 N left. Here the balance of every ball is
+    written out (Jones 1960) with the answer's forces and angles, at the speed of the cage that
+    rolling asks for on the mean; and the contacts are where their deformations put them."""
     answer = respond(AGAINST, share * ASIDE)
     assert (answer.ball_force > 3.0).all()
     inertia, (outer, inner) = AGAINST.inertia, (answer.outer_angle, answer.inner_angle)
@@ -198,7 +201,8 @@ def test_stiffness_of_a_row_between_rings_that_turn_against_each_other():
 @pytest.mark.parametrize("cage", [None, -330.0], ids=["as-it-rolls", "with-a-cage"])
 @pytest.mark.parametrize("rpm", [3000, 20_000, 60_000])
 def test_a_ball_settles_however_loose_it_is_between_rings_that_turn_against_each_other(rpm, cage):
-    """From 30 um of play to 10 um pressed, held by both races: where the moment outdoes the centrifugal force, the circles about the groove centres cross nearer the axis."""
+    """From 30 um of play to 10 um pressed, held by both races: where the moment outdoes the
+    centrifugal force, the circles about the groove centres cross nearer the axis."""
     inertia = replace(AGAINST.inertia, inner_speed=rpm * RPM, outer_speed=-rpm * RPM, cage=None if cage is None else cage * rpm / 20_000)
     ball = HeavyBall(AGAINST.inner_length, AGAINST.outer_length, AGAINST.inner_constant, AGAINST.outer_constant, inertia)
     for stretch in np.linspace(-30e-6, 10e-6, 81):

@@ -50,7 +50,8 @@ def test_pressure_of_the_ellipse_carries_the_load():
     [(0.3204, 1.2623, 0.8114), (0.6716, 1.8258, 0.6245), (0.87366, 2.800, 0.4863), (0.93657, 3.738, 0.4166), (0.97290, 5.267, 0.3490), (0.983797, 6.448, 0.3150)],
 )
 def test_half_axes_and_pressure_of_the_published_table(difference, a, b):
-    """Harris, Rolling Bearing Analysis, Table 6.1: dimensionless half axes by the curvature difference; of steel they are 0.0236 (Q / rho)^(1/3) mm times these."""
+    """Harris, Rolling Bearing Analysis, Table 6.1: dimensionless half axes by the curvature
+    difference; of steel they are 0.0236 (Q / rho)^(1/3) mm times these."""
     load, total = 800.0, 0.202e3
     across, along = total * (1 - difference) / 2, total * (1 + difference) / 2
     contact = point_contact(10e-3, along - 200.0, across - 200.0, (207e9, 0.3), (207e9, 0.3))
@@ -61,8 +62,9 @@ def test_half_axes_and_pressure_of_the_published_table(difference, a, b):
 
 
 def test_pressure_of_a_209_bearing():
-    """12.7 mm balls in grooves of 6.6 mm on a pitch circle of 65 mm: curvature sums 0.202 and 0.138 1/mm, differences 0.940 and 0.912 (Harris, ch. 2), whence the half axes of
-    Table 6.1 between its rows. The pressure over the ellipse, half an ellipsoid, carries the load."""
+    """12.7 mm balls in grooves of 6.6 mm on a pitch circle of 65 mm: curvature sums 0.202 and 0.138
+    1/mm, differences 0.940 and 0.912 (Harris, ch. 2), whence the half axes of Table 6.1 between its
+    rows. The pressure over the ellipse, half an ellipsoid, carries the load."""
     load, steel = 4536.0, (207e9, 0.3)
     rows = np.array([[0.87366, 2.800, 0.4863], [0.90999, 3.233, 0.4499], [0.93657, 3.738, 0.4166], [0.95738, 4.395, 0.3830]])
     for inner, total, difference in ((True, 0.202, 0.940), (False, 0.138, 0.912)):

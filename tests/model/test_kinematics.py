@@ -54,7 +54,8 @@ def test_balls_roll_without_slip(cold, inner, outer):
 
 
 def test_the_cage_of_heavy_balls_is_that_of_their_equilibrium(spindle):
-    """At 60000 rpm the contact angles are 21 degrees apart; the cage turns as that orbit does whose centrifugal force parts them, and slower than at their mean."""
+    """At 60000 rpm the contact angles are 21 degrees apart; the cage turns as that orbit does whose
+    centrifugal force parts them, and slower than at their mean."""
     heavy, condition = replace(spindle, ball_inertia=1.0), Condition(20.0, 60000 * RPM)
     state = solve(heavy, condition, {b.name: reference_motion(20.0) for b in heavy.bearings})
     b, kin = state.bearing("upper"), row_kinematics(heavy, state)["upper"]

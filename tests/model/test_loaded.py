@@ -54,7 +54,8 @@ def shares(state):
 
 
 def test_forces_and_moments_balance(pair: Spindle) -> None:
-    """The hub carries the outer rings: what the rows put on it and the load cancel, and so do their moments, tilt moments of the rows included."""
+    """The hub carries the outer rings: what the rows put on it and the load cancel, and so do their
+    moments, tilt moments of the rows included."""
     force, z = np.array([3.0, -1.0]), 0.025
     _, state = under(pair, (3.0, -1.0), z)
     assert shares(state).sum(axis=0) == pytest.approx(force, rel=1e-6)
@@ -77,7 +78,8 @@ def test_two_loads_are_the_one_of_their_forces_and_moments(pair: Spindle, five: 
 
 @pytest.mark.parametrize("scene", ["pair", "five"])
 def test_weight_is_borne_by_the_rows_of_what_turns(scene: str, request: pytest.FixtureRequest) -> None:
-    """Each mass where it is: forces on the outer rings add up to the weight of what the rows carry, and their moment is that of its centre of mass. It is far below the preload, so a second g adds as much."""
+    """Each mass where it is: forces on the outer rings add up to the weight of what the rows carry, and
+    their moment is that of its centre of mass. It is far below the preload, so a second g adds as much."""
     spindle = request.getfixturevalue(scene)
     still = {b.name: reference_motion(spindle.reference_temperature) for b in spindle.ringed}
     state = solve(spindle, Condition(spindle.reference_temperature), still)
@@ -94,7 +96,8 @@ def test_weight_is_borne_by_the_rows_of_what_turns(scene: str, request: pytest.F
 
 
 def test_a_preload_that_a_load_turns_round_is_less_than_nothing(pair: Spindle) -> None:
-    """Far beyond any use: under 8 kN across and 9.6 kN along, a row bears along z against its own sense; with their signs, the forces bear the load."""
+    """Far beyond any use: under 8 kN across and 9.6 kN along, a row bears along z against its own
+    sense; with their signs, the forces bear the load."""
     _, state = under(replace(pair, axial_load=9600.0), (8000.0, 0.0), 0.02)
     forces = [pair.bearing(b.name).sense * b.preload for b in state.bearings]
     assert min(b.preload for b in state.bearings) < -10.0
@@ -189,8 +192,9 @@ def on_spring(rate: float | None, mass: float = 0.0) -> Spindle:
 
 
 def test_a_ring_on_a_spring_slides_under_the_load() -> None:
-    """A spring without a rate keeps its force: each row has the 16 N it was set to, as with a soft one. One without end stiff is a fixed ring, which the rows' own axial push under a radial
-    load makes 16.5 N. Between them the spring's force goes with how far the ring slid."""
+    """A spring without a rate keeps its force: each row has the 16 N it was set to, as with a soft
+    one. One without end stiff is a fixed ring, which the rows' own axial push under a radial load
+    makes 16.5 N. Between them the spring's force goes with how far the ring slid."""
     free, soft, stiff, stiffer = (under(on_spring(rate), (20.0, 5.0), 0.01)[1].bearings for rate in (None, 1.0, 1e12, 1e13))
     fixed = under(replace(on_spring(None), sets=tuple(replace(s, spring=None) for s in on_spring(None).sets)), (20.0, 5.0), 0.01)[1].bearings
     for a, b, c, d, e in zip(free, soft, stiff, stiffer, fixed, strict=True):

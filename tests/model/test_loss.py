@@ -83,7 +83,8 @@ def test_mujoco_has_the_same_dampers(speed):
 
 
 def test_a_shaft_is_hit_without_mujoco_or_refused():
-    """Dampers between all nodes: the reduced model's record has the peaks of the exact FRFs; MuJoCo's steps are refused, with what is allowed."""
+    """Dampers between all nodes: the reduced model's record has the peaks of the exact FRFs;
+    MuJoCo's steps are refused, with what is allowed."""
     path = ROOT / "scenes" / "mk7702" / "spindle.toml"
     raw = tomllib.loads(path.read_text())
     del raw["shafts"][0]["damping_ratio"], raw["shafts"][0]["origins"]["damping_ratio"]

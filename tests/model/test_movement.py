@@ -31,7 +31,8 @@ class Sleeve:
 
 @dataclass(frozen=True)
 class Rings:
-    """What one movement of a hub balances: rows whose outer rings it moves with it (1) or against it (-1), rows on sleeves, and the load on it (N)."""
+    """What one movement of a hub balances: rows whose outer rings it moves with it (1) or against
+    it (-1), rows on sleeves, and the load on it (N)."""
 
     fixed: tuple[tuple[BallRow, int], ...]
     sleeves: tuple[Sleeve, ...] = ()
@@ -121,7 +122,8 @@ def test_what_nothing_presses_stays():
 
 @pytest.mark.parametrize("pressed", [1e-6, 20e-6])
 def test_what_has_play_hangs_loose(pressed):
-    """One row is pressed, and its play is the other's: it leaves it for good, and no stiffness of a few N/m stays. Of steps that come near its end none reached it."""
+    """One row is pressed, and its play is the other's: it leaves it for good, and no stiffness of a
+    few N/m stays. Of steps that come near its end none reached it."""
     row = replace(ROW, axial=ROW.axial + pressed)
     rings = Rings(((row, 1), (replace(mirrored(ROW), axial=-ROW.axial + 100e-6), 1)))
     moved = rings.stepped()

@@ -231,7 +231,8 @@ def test_ball_inertia_at_speed(spindle):
 
 @pytest.mark.parametrize("temperature", [20.0, 45.0])
 def test_a_spring_behind_one_of_two_rows_is_in_balance_with_the_others(temperature):
-    """Of rows that are loaded one way one alone on the spring: the shaft is in balance all the same, and not held by what the rows were drawn with."""
+    """Of rows that are loaded one way one alone on the spring: the shaft is in balance all the
+    same, and not held by what the rows were drawn with."""
     whole = load(ROOT / "scenes" / "five_bearing")
     half = replace(whole, sets=tuple(replace(s, spring=PreloadSpring(("front1",))) if s.name == "front" else s for s in whole.sets))
     state = solve(half, Condition(temperature), expand(half, temperature))

@@ -176,7 +176,8 @@ parallel.in_parallel(work, range(8), 2, done=lambda result: time.sleep(600))
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows keeps the number of a parent that is gone")
 def test_workers_end_with_the_process_that_was_killed(tmp_path):
-    """Found by `make faults`: a worker with a large result in hand waited for ever, since nobody read the pipe and it held its other end itself."""
+    """Found by `make faults`: a worker with a large result in hand waited for ever, since nobody
+    read the pipe and it held its other end itself."""
     running = subprocess.Popen([sys.executable, "-c", KILLED], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)})
     until = time.monotonic() + 120
     while len(list(tmp_path.glob("*.pid"))) < 2 and time.monotonic() < until:

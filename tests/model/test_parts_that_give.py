@@ -1,4 +1,5 @@
-"""Rings in parts that joints hold together: as stiff as one housing where the joint is, and as soft as a spring behind the ring where that is all the joint has."""
+"""Rings in parts that joints hold together: as stiff as one housing where the joint is, and as soft
+as a spring behind the ring where that is all the joint has."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ MOVES = ["x", "y", "z", "tilt_x", "tilt_y"]
 
 
 def mounted(plate: float | None = None, of: str = "rear", load: float = 0.0, **preload) -> Spindle:
-    """The template's spindle with a preload, and the outer ring `of` a row in a plate that a joint of so many N/m along the axis holds to the housing."""
+    """The template's spindle with a preload, and the outer ring `of` a row in a plate that a joint
+    of so many N/m along the axis holds to the housing."""
     raw = tomllib.loads(FILE.read_text(encoding="utf-8"))
     raw["axial_load_N"] = load
     for key in ("preload_rate_N_per_m", "sprung_bearings", "sprung_ring_mass_g"):
@@ -54,7 +56,8 @@ def test_a_stiff_joint_is_one_housing(of, preload, load):
 
 @pytest.mark.parametrize("rate", [2e5, 2e6, 2e7])
 def test_a_soft_joint_is_a_spring_behind_the_ring(rate):
-    """At the reference the preload is as stated, whatever the joint: spindles are preloaded as they are put together. It was lost whole, in silence."""
+    """At the reference the preload is as stated, whatever the joint: spindles are preloaded as they
+    are put together. It was lost whole, in silence."""
     through_the_plate, by_a_spring = (preloads(s) for s in (mounted(rate, preload_kind="rigid"), mounted(**SPRUNG, preload_rate_N_per_m=rate)))
     assert through_the_plate[:2] == pytest.approx([180.0, 180.0], rel=1e-6)
     assert through_the_plate == pytest.approx(by_a_spring, rel=1e-5)
@@ -62,7 +65,8 @@ def test_a_soft_joint_is_a_spring_behind_the_ring(rate):
 
 
 def test_a_joint_beside_the_bearings_takes_the_load():
-    """Between what carries inner and outer rings, as a magnetic thrust bearing is: of a load it takes what its rate is of the whole. It was left out of the balance."""
+    """Between what carries inner and outer rings, as a magnetic thrust bearing is: of a load it
+    takes what its rate is of the whole. It was left out of the balance."""
 
     def sharing(rate: float, load: float) -> list[float]:
         raw = tomllib.loads(FILE.read_text(encoding="utf-8"))
@@ -89,7 +93,8 @@ def of_parts(**of: tuple[str, str]) -> tuple[SimpleNamespace, dict, dict]:
 
 
 def test_a_load_on_no_one_part_is_refused():
-    """Three rows in a chain of four parts: what would it act on? And on a housing that carries all outer rings, about two shafts that turn, joints that hold it would take it all."""
+    """Three rows in a chain of four parts: what would it act on? And on a housing that carries all
+    outer rings, about two shafts that turn, joints that hold it would take it all."""
     for rows in ({"a": ("spindle", "housing"), "b": ("spindle", "plate"), "c": ("wheel", "plate")}, {"a": ("spindle", "housing"), "b": ("wheel", "housing")}):
         with pytest.raises(NoEquilibrium, match="axial_load_N = 40: there is no one part that turns and carries all inner rings, or all outer ones"):
             _load(*of_parts(**rows))

@@ -58,7 +58,8 @@ def test_poles_of_the_reduced_model_in_the_band(scene: str, rpm: float):
 
 @pytest.mark.parametrize(("scene", "rpm"), CASES)
 def test_vectors_of_a_coarser_model(scene: str, rpm: float):
-    """As many modes as the finer one has, those up to half of the highest asked for to 1e-5; left and right vectors belong together, left (2 p M + C) right being one."""
+    """As many modes as the finer one has, those up to half of the highest asked for to 1e-5; left
+    and right vectors belong together, left (2 p M + C) right being one."""
     spindle, whole, _, _ = _both(scene, rpm)
     highest = 2.5 * spindle.hammer.band[1]
     fine, _ = poles_below(whole, highest)

@@ -79,7 +79,8 @@ def test_the_most_loaded_roller_without_clearance() -> None:
 
 @pytest.mark.parametrize("clearance", [-8e-6, -4e-6, 0.0, 5e-6])
 def test_forces_are_the_mean_over_all_places_of_the_cage(clearance: float) -> None:
-    """Roller by roller at many places of the cage, rings displaced and tilted; a single place is off by more than a hundred times what is left."""
+    """Roller by roller at many places of the cage, rings displaced and tilted; a single place is
+    off by more than a hundred times what is left."""
     some, at = row(clearance, rollers=12, offsets=(-0.009, 0.009)), np.array([-5e-6, 3e-6, 0.0, 1e-4, -3e-4])
     places = [with_cage_at(some, at, turn) for turn in 2 * np.pi / 12 * (np.arange(4000) + 0.5) / 4000]
     force, tangent = (np.mean([place[k] for place in places], axis=0) for k in (0, 1))
@@ -136,7 +137,8 @@ ROW = {
 
 
 def text(clearance_um: float) -> str:
-    """The small shaft that turns in a housing, with a roller row above in place of its upper ball row; the lower one is pushed from outside."""
+    """The small shaft that turns in a housing, with a roller row above in place of its upper ball
+    row; the lower one is pushed from outside."""
     raw = FILE.read_text(encoding="utf-8")
     head, pair = raw.split("[bearings.upper]", 1)
     _, tail = pair.split("# ---------------------------------------------------------------- rotor-base structure", 1)
@@ -208,8 +210,8 @@ def test_a_spindle_of_one_steel_keeps_its_clearance(above) -> None:
 
 
 def test_a_warm_housing_of_aluminium_lets_the_rollers_go(above) -> None:
-    """It widens the outer ring more than the steel shaft does the inner one: rollers that were pressed are less so, and softer. By bonded rings the outer
-    race moves by some 5 um over 40 K, so that 3 um of interference are gone."""
+    """It widens the outer ring more than the steel shaft does the inner one: rollers that were pressed are less so,
+    and softer. By bonded rings the outer race moves by some 5 um over 40 K, so that 3 um of interference are gone."""
     cold, warm, hot = (operating_point(above, Condition(t)).state.any_bearing("upper") for t in (20.0, 25.0, 60.0))
     assert cold.clearance < warm.clearance < hot.clearance
     assert cold.radial_stiffness > warm.radial_stiffness > hot.radial_stiffness == 0.0

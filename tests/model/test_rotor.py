@@ -70,7 +70,8 @@ def test_forward_whirl_is_the_faster_one():
 
 
 def test_whirl_is_that_of_the_whole_axis():
-    """A rotor on bearings soft in y at one end and in x at the other: the sense of a mode is that of its orbits wherever they are large, and mixed where both senses are."""
+    """A rotor on bearings soft in y at one end and in x at the other: the sense of a mode is that
+    of its orbits wherever they are large, and mixed where both senses are."""
     spindle = rotor((211.0, 0.3, 7810.0), [(50, 1500)], [], [(500, 15.0, 0.1, 0.2), (1000, 25.0, 0.3, 0.6)], [(0, 1e7, 1e6), (1500, 1e6, 1e7)], longest=62.5)
     shaken = flexible(spindle, 6000 * RPM)
     found = [m for m in modes(shaken)[:9] if m.kind != "axial"]
@@ -134,7 +135,8 @@ def test_frf_is_the_inverse_of_the_dynamic_stiffness(spindle, kind, rpm):
 @pytest.mark.parametrize("offset", [0.0, 0.01])
 @pytest.mark.parametrize("kind", ["receptance", "mobility", "accelerance"])
 def test_what_nothing_holds_moves_as_a_free_body(kind, offset):
-    """F = m a of a hub on bearings that have lost contact, beside a plate on a spring: poles at zero are double and have one vector, of which a sum over poles made 1e276."""
+    """F = m a of a hub on bearings that have lost contact, beside a plate on a spring: poles at
+    zero are double and have one vector, of which a sum over poles made 1e276."""
     mass, inertia, plate, spring = 0.018, 4e-6, 0.3, 1e7
     linear = Matrices(np.diag([mass, inertia, plate]), np.zeros((3, 3)), np.diag([0.0, 0.0, spring]), (("hub", "z"), ("hub", "tilt_x"), ("plate", "z")))
     assert poles(linear).parallel
@@ -319,7 +321,8 @@ def test_an_impossible_inertia_is_refused_and_not_clipped(spindle, cold):
 
 @pytest.mark.parametrize("outer", ["housing", "ground"])
 def test_a_ring_on_its_spring_may_slide_on_what_stands_still(outer):
-    """A shaft of 2 kg on a bearing whose ring of 0.1 kg slides on a spring: two masses and two springs in a row, whatever carries the spring; the ground is no body."""
+    """A shaft of 2 kg on a bearing whose ring of 0.1 kg slides on a spring: two masses and two
+    springs in a row, whatever carries the spring; the ground is no body."""
     bodies = [Body("shaft", 2.0, (1.0, 1.0, 1.0), 0.0, ("z",), False, ())]
     if outer != "ground":
         bodies.append(Body(outer, 1.0, (1.0, 1.0, 1.0), 0.0, (), False, ()))

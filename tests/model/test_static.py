@@ -26,7 +26,8 @@ FILE = ROOT / "tests" / "scenes" / "symmetric" / "spindle.toml"
 
 
 def of_a_row(spindle, b) -> float:
-    """Axial stiffness (N/m) of a preloaded row: dF/dz of F = Z Q(s) sin(angle) with s the distance of the groove centres, Z (Q' sin^2 + Q cos^2 / s)."""
+    """Axial stiffness (N/m) of a preloaded row: dF/dz of F = Z Q(s) sin(angle) with s the distance
+    of the groove centres, Z (Q' sin^2 + Q cos^2 / s)."""
     row = spindle.bearing(b.name)
     force = row.preload / (row.balls * np.sin(row.contact_angle))
     slope = 1.5 * force / b.deformation  # Q is as deformation^1.5
@@ -52,7 +53,8 @@ def test_along_the_axis_bearings_are_in_parallel_and_what_holds_them_in_series(c
 
 
 def test_a_shaft_shares_an_axial_force_as_its_bearings_and_pieces_are_stiff(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Bearings to the ground of 2e7 and 6e7 N/m along the axis, each behind a piece of a bar, E A / l, in parallel; the disc's seat in series."""
+    """Bearings to the ground of 2e7 and 6e7 N/m along the axis, each behind a piece of a bar, E A /
+    l, in parallel; the disc's seat in series."""
     assert main(["new", "rotor", "--like", "rotor", "--out", str(tmp_path / "rotor")]) == 0
     file = tmp_path / "rotor" / "spindle.toml"
     along = iter((2e7, 6e7))
@@ -80,7 +82,8 @@ def test_a_shaft_shares_an_axial_force_as_its_bearings_and_pieces_are_stiff(tmp_
 
 
 def test_bearings_given_by_numbers_lie_between_what_they_connect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """An intershaft bearing of 5 N/um to a drum on 10 N/um: at the drum the two rotors' springs share the force, however bearings are taken; the drum is no ground."""
+    """An intershaft bearing of 5 N/um to a drum on 10 N/um: at the drum the two rotors' springs
+    share the force, however bearings are taken; the drum is no ground."""
     (tmp_path / "spindle.toml").write_text(TWO_ROTORS.replace('table = "rear.csv"', "radial_stiffness_N_per_um = 30.0"), encoding="utf-8")
     answers = {}
     for words in ([], ["--bearings", "computed"], ["--bearings", "rated"]):
@@ -116,7 +119,8 @@ def test_across_a_radial_load_a_little_more_load_moves_the_nose_by_the_complianc
 
 
 def test_a_static_answer_asks_for_no_mass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of a shaft without mass, as in textbooks, on a stiff seat; by hand 1 / (a^2 b^2 / (3 E I L) + bearings, left b / L and right a / L of the force on 2e7 N/m each + seat)."""
+    """Of a shaft without mass, as in textbooks, on a stiff seat; by hand 1 / (a^2 b^2 / (3 E I L) +
+    bearings, left b / L and right a / L of the force on 2e7 N/m each + seat)."""
     text = (ROOT / "scenes" / "templates" / "rotor.toml").read_text(encoding="utf-8")
     changes = ("density_kg_per_m3 = 7850.0", "density_kg_per_m3 = 1.0"), ("longest_element_mm", 'beam = "euler-bernoulli"\nlongest_element_mm')
     stiff = (("lateral_stiffness_N_per_m = [5.0e8, 5.0e8]", "lateral_stiffness_N_per_m = [1e10, 1e10]"), ("[2.0e5, 2.0e5]", "[1e8, 1e8]"))
@@ -135,7 +139,8 @@ def test_a_static_answer_asks_for_no_mass(tmp_path: Path, capsys: pytest.Capture
 
 
 def test_a_preload_spring_is_told_by_its_name_where_it_gives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Beside the bearings stood a column "bearings" of zeros: the share of a spring that acts along the axis alone. A point along it has some."""
+    """Beside the bearings stood a column "bearings" of zeros: the share of a spring that acts along
+    the axis alone. A point along it has some."""
     scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace("# preload_rate", "preload_rate").replace("# sprung_ring", "sprung_ring")
     file = tmp_path / "spindle.toml"
     for text, named in ((scene, False), (scene.replace('direction = "+Y"', 'direction = "+Z"', 1), True)):

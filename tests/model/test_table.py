@@ -38,7 +38,8 @@ def test_reads_back_what_was_written(table, tmp_path):
 
 
 def test_outer_contacts_carry_the_centrifugal_force_too(table, tmp_path):
-    """At rest both contacts of a ball carry the same; at 12,000 rpm those of a machine tool's light front rows the outer one twice as much. A table without the column is read."""
+    """At rest both contacts of a ball carry the same; at 12,000 rpm those of a machine tool's light
+    front rows the outer one twice as much. A table without the column is read."""
     at_rest = table.values["upper"]
     assert at_rest["outer_contact_force_N"] == pytest.approx(at_rest["contact_force_N"], rel=1e-12)
     fast = stiffness_table(load(ROOT / "scenes" / "five_bearing"), [20.0], [12000 * RPM]).values["front1"]
@@ -57,7 +58,8 @@ def test_outer_contacts_carry_the_centrifugal_force_too(table, tmp_path):
 
 
 def test_a_bearing_under_a_radial_load_is_told_along_x_and_along_y(table, tmp_path, capsys):
-    """Derivatives of the forces of its balls; a table of it as a bearing of numbers has them too. Without the load no column tells directions apart."""
+    """Derivatives of the forces of its balls; a table of it as a bearing of numbers has them too.
+    Without the load no column tells directions apart."""
     assert not any(set(BY_DIRECTION) & set(columns) for columns in table.values.values())
     folder = tmp_path / "pushed"
     folder.mkdir()
@@ -93,7 +95,8 @@ def grinding(tmp_path_factory):
 
 
 def test_a_table_of_a_loaded_bearing_holds_its_whole_stiffness(grinding, tmp_path):
-    """Read back as a bearing of numbers it is the same matrix at every condition of the grid; without the columns between directions it was another, by up to 0.47 of sqrt(k_ii k_jj) here."""
+    """Read back as a bearing of numbers it is the same matrix at every condition of the grid;
+    without the columns between directions it was another, by up to 0.47 of sqrt(k_ii k_jj) here."""
     spindle, temperatures, speeds = load(grinding), [20.0, 40.0], [0.0, 10_000 * RPM]
     found = stiffness_table(spindle, temperatures, speeds)
     write_table(found, tmp_path / "table.csv")

@@ -97,7 +97,8 @@ def test_names_that_are_patterns_or_long(tmp_path):
 
 
 def test_what_killed_runs_left_of_a_study_goes_when_it_is_gone_on_with(tmp_path):
-    """A run killed after its part stood and before its work folder was gone: that part is not written again, and the folder stayed for good."""
+    """A run killed after its part stood and before its work folder was gone: that part is not
+    written again, and the folder stayed for good."""
     for _ in range(2):
         with opened(tmp_path / "study", {"study": "a"}, 4, 2, pa.schema({})) as folder:
             write_table(pa.table({}), folder.part(0))

@@ -1,6 +1,7 @@
 """A headless Chromium, driven over its DevTools protocol: what a user sees and does, for tests and for pictures of docs/.
 
-Tornado, which the workbench's library brings, speaks to it; no driver needs to be installed. Protocol: https://chromedevtools.github.io/devtools-protocol/
+Tornado, which the workbench's library brings, speaks to it; no driver needs to be installed.
+Protocol: https://chromedevtools.github.io/devtools-protocol/
 """
 
 from __future__ import annotations

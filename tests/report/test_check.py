@@ -292,7 +292,8 @@ def test_bearings_given_by_numbers_bear_a_radial_load_by_the_lever_rule(tmp_path
 @pytest.mark.parametrize("density", [1.0, 7850.0])
 @pytest.mark.parametrize("beam", ["timoshenko", "euler-bernoulli"])
 def test_a_light_shaft_keeps_its_modes_at_any_mesh(beam: str, density: float, element: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of a disc on a shaft nearly without mass the whirl is sqrt(k / m) / 2 pi at 151 Hz, and `check` counts what `modes` finds. Where rounding hides it, that is said."""
+    """Of a disc on a shaft nearly without mass the whirl is sqrt(k / m) / 2 pi at 151 Hz, and
+    `check` counts what `modes` finds. Where rounding hides it, that is said."""
     text = SCENES["rotor"].read_text(encoding="utf-8").replace("density_kg_per_m3 = 7850.0", f"density_kg_per_m3 = {density}")
     (tmp_path / "spindle.toml").write_text(text.replace("longest_element_mm = 65.0", f'beam = "{beam}"\nlongest_element_mm = {element}'), encoding="utf-8")
     found = checked(tmp_path, capsys)

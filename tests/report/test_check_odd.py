@@ -158,7 +158,8 @@ def massless(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> lis
 
 
 def test_a_region_whose_mass_nothing_has_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of a part whose bodies are all made of regions; a body given by numbers, or a ground that holds rings, may stand for what is not named."""
+    """Of a part whose bodies are all made of regions; a body given by numbers, or a ground that
+    holds rings, may stand for what is not named."""
     text = (ROOT / "tests" / "scenes" / "inner_turning_spring" / "spindle.toml").read_text(encoding="utf-8")
     left_out = text.replace('regions = ["shaft", "nose", "lower inner ring", "upper inner ring"]\nmoves', 'regions = ["shaft", "lower inner ring", "upper inner ring"]\nmoves')
     assert left_out != text
@@ -199,7 +200,8 @@ def critical_words(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 def test_unbalance_is_told_to_drive_what_whirls_with_the_rotor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """In supports that are alike in all directions it does nothing to the backward mode at that speed; in others to both, each by its share."""
+    """In supports that are alike in all directions it does nothing to the backward mode at that
+    speed; in others to both, each by its share."""
     text = SCENES["rotor"].read_text(encoding="utf-8").replace("nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0")
     (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
     point = operating_point(load(tmp_path), Condition(20.0, 7200 * RPM))

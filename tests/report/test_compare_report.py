@@ -141,7 +141,8 @@ def test_the_log_reads_back(compared, compared_folder, low):
 
 
 def test_what_symmetry_forbids_has_a_view_in_the_log_too(spindle, low, tmp_path):
-    """Computed as nothing at all where noise alone was measured, measured as nothing, and neither: every curve is there, on an axis of its own."""
+    """Computed as nothing at all where noise alone was measured, measured as nothing, and neither:
+    every curve is there, on an axis of its own."""
     test = low.tests[0]
     computed, measured = test.frf.value.copy(), test.frf.value.copy()
     computed[3, 0], measured[4, 0], computed[5, 1], measured[5, 1] = 0.0, 0.0, 0.0, 0.0

@@ -30,7 +30,8 @@ def test_the_whole_is_one_percent_low(compared):
 
 
 def test_what_is_the_same_at_all_conditions_is_said_with_its_figures(compared, compared_folder, capsys):
-    """A scene that add had made of a diagnosis was 25 standard errors off where diagnose had told 1.9: constant errors of modes are free there, and nothing said so."""
+    """A scene that add had made of a diagnosis was 25 standard errors off where diagnose had told
+    1.9: constant errors of modes are free there, and nothing said so."""
     constant = constant_errors(compared.tests)
     assert list(constant.frequency.values()) == pytest.approx([0.01] * len(constant.frequency), abs=1e-3)
     assert constant.share > 0.99
@@ -73,7 +74,8 @@ def test_where_no_mode_was_found_frfs_alone_are_told(quiet, capsys):
 
 
 def test_errors_that_hang_together_are_told(compared):
-    """Where every mode by itself is within what its test's temperature may do, and all of them at once are not, no mode is called the worst."""
+    """Where every mode by itself is within what its test's temperature may do, and all of them at
+    once are not, no mode is called the worst."""
     largest = max(abs(m.residual) for t in compared.tests for m in t.modes)
     together = replace(compared, tests=tuple(replace(t, missing=(), residuals=np.full_like(t.residuals, 100 * largest)) for t in compared.tests))
     words = f"no mode alone is off by more than {largest:.1f}, but their errors hang together"
@@ -103,7 +105,8 @@ def test_furthest_off_says_in_what(compared):
 
 
 def test_a_mode_that_is_off_alone_where_all_agree_together_is_told(compared):
-    """What errors of a test have in common makes up for much: a mode that stands 2 to 3 standard errors off in every test was said to agree."""
+    """What errors of a test have in common makes up for much: a mode that stands 2 to 3 standard
+    errors off in every test was said to agree."""
     moved = [
         replace(t, missing=(), residuals=0 * t.residuals, modes=tuple(replace(m, computed=m.measured + (2.5 * m.sd if m.number == 3 else 0.0)) for m in t.modes))
         for t in compared.tests
@@ -186,7 +189,8 @@ def test_many_tests_are_a_row_a_mode(compared):
 
 
 def test_hysteretic_damping_is_said_where_modes_are_damped_much():
-    """A mode at 4800 Hz with 12.5 % of critical, of which a complex stiffness has the pole 1.6 % higher: it was called a constant error of the drawing."""
+    """A mode at 4800 Hz with 12.5 % of critical, of which a complex stiffness has the pole 1.6 %
+    higher: it was called a constant error of the drawing."""
 
     def said(measured, damping, sd=5.0):
         mode = SimpleNamespace(number=9, measured=measured, computed=4727.0, sd=sd, damping_computed=damping, error=4727.0 - measured)

@@ -21,8 +21,8 @@ from thermospindle.report.text.diagnosis.answer import _candidate
 
 @pytest.mark.parametrize("temperatures", [(20.0, 60.0), (20.0,)])
 def test_errors_of_conditions_left_out_are_of_every_candidate(temperatures):
-    """An explanation that is not accepted has the ratio that it would have if it were: that of conditions predicted from all others, not of the data that
-    it was fitted to. Of one condition there is none."""
+    """An explanation that is not accepted has the ratio that it would have if it were: that of conditions
+    predicted from all others, not of the data that it was fitted to. Of one condition there is none."""
     scene, softer = load(ROOT / "tests" / "scenes" / "symmetric"), effect("bond_softening")
     model = model_of(scene, mode_campaign(scene, [Condition(t) for t in temperatures], 1, [(softer, softer.typical())], damping=False))
     mechanism = variants(softer)[0]

@@ -131,7 +131,8 @@ def test_bars_that_are_cut_say_so():
 
 
 def test_errors_are_those_of_the_answer(told):
-    """The page of the tutorial had two equal bars a test, "before 1.00, after 1.00", for an effect that takes `compare` from 98.6 to 0.7: fitted tolerances hide it."""
+    """The page of the tutorial had two equal bars a test, "before 1.00, after 1.00", for an effect
+    that takes `compare` from 98.6 to 0.7: fitted tolerances hide it."""
     found, answer = told
     model, error = found.search.model, answer["error"]
     fitted, unseen = errors(found).axes

@@ -28,7 +28,8 @@ from thermospindle.sim.effects import of_scene
 
 
 def test_what_speaks_against_a_name_is_said_beside_it(told, capsys):
-    """A bond was identified of which left-out tests were missed by 50.6 standard errors instead of 39.4, at -32 nm/N in one test, and no word told the reader to doubt."""
+    """A bond was identified of which left-out tests were missed by 50.6 standard errors instead of
+    39.4, at -32 nm/N in one test, and no word told the reader to doubt."""
     found, answer = told
     v = found.verdict
     [best] = v.candidates
@@ -57,7 +58,8 @@ def test_what_speaks_against_a_name_is_said_beside_it(told, capsys):
 
 
 def test_none_says_what_moved(nothing_missing, capsys):
-    """A table of four modes was "none, chi2 0.00 a number" where `compare` said "does not agree, 70.6 standard errors": errors of 0.3 % had been granted to every mode."""
+    """A table of four modes was "none, chi2 0.00 a number" where `compare` said "does not agree,
+    70.6 standard errors": errors of 0.3 % had been granted to every mode."""
     answer = diagnosis_json(nothing_missing)
     assert answer["verdict"] == "none"
     model, base = nothing_missing.search.model, nothing_missing.search.base
@@ -137,7 +139,8 @@ def test_add_takes_what_it_fitted(told, spindle, tmp_path, capsys):
 
 
 def test_a_scene_gets_the_tolerances_that_go_without_what_it_cannot_hold():
-    """Of two that were fitted one against the other, the conditional mean where the one that no scene holds is nothing; a constant error of a mode, and a channel's gain, stay as they were fitted."""
+    """Of two that were fitted one against the other, the conditional mean where the one that no scene
+    holds is nothing; a constant error of a mode, and a channel's gain, stay as they were fitted."""
     kinds = (kinds_of.BUILD, kinds_of.BALLS, kinds_of.STIFFNESS, kinds_of.GAIN)
     parameters = [Nuisance(kind, kind, 0.01) for kind in kinds]
     covariance = np.eye(5)

@@ -53,7 +53,8 @@ def test_temperature_colours_go_from_cold_to_hot():
 
 
 def test_lines_of_a_sweep_have_a_look_for_each_quantity():
-    """Colours say the temperature alone, dashes the speed, marks what else is varied, which is named with what it is of; no two lines look the same."""
+    """Colours say the temperature alone, dashes the speed, marks what else is varied, which is
+    named with what it is of; no two lines look the same."""
     others = ["vary.structure.joints.cone.lateral_stiffness_N_per_m", "temperature_C", "speed_rpm"]
     lines = list(product(["[200000000.0, 200000000.0]", "[300000000.0, 300000000.0]"], [20.0, 50.0], [0.0, 24000.0]))
     looks, key = looks_of(others, lines)

@@ -70,7 +70,8 @@ def test_a_file_in_the_way_is_named(tmp_path):
 
 @pytest.mark.parametrize("name", ["", ".", ".."])
 def test_where_one_stands_is_not_replaced(tmp_path, monkeypatch, name):
-    """An empty name, as of a shell's variable that is not set, is the folder one stands in: replaced, even an empty one leaves the shell in a folder that is gone."""
+    """An empty name, as of a shell's variable that is not set, is the folder one stands in:
+    replaced, even an empty one leaves the shell in a folder that is gone."""
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     with pytest.raises(BadInput, match="is where you stand"):

@@ -162,7 +162,8 @@ def test_a_response_that_vanishes_by_symmetry_does_not_set_the_limits(run: Run) 
 
 
 def test_colours_of_hits_are_no_temperatures_and_have_a_key(two_hits: Run, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They were blue and red beside blue and red of temperatures, without a word; and measured modes at two temperatures were two like greens."""
+    """They were blue and red beside blue and red of temperatures, without a word; and measured
+    modes at two temperatures were two like greens."""
     keys = []
     monkeypatch.setattr(log.figures, "panels", lambda *args: keys.append(args[4]) or panels(*args))
     with rr.RecordingStream("thermospindle") as recording:

@@ -156,7 +156,8 @@ def test_an_absent_folder(warm: Warmup, tmp_path: Path) -> None:
 
 
 def test_entities_are_short_paths_of_the_names_in_the_figure(warm: Warmup, file: Path) -> None:
-    """They were long titles in escaped letters, regions had no names at all, and nothing said what the section's colours between the ends are."""
+    """They were long titles in escaped letters, regions had no names at all, and nothing said what
+    the section's colours between the ends are."""
     entities = [e for e in ts.read_log(file).entities if e.startswith("/series/")]
     assert {e.split("/")[2] for e in entities} == {"regions", "bearings", "modes"}
     assert {"/series/regions/shaft", "/series/bearings/temperature/lower", "/series/bearings/friction\\ heat/upper"} <= set(entities)

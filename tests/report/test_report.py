@@ -209,7 +209,8 @@ def test_same_run_same_file_written_whole(run: Run, text: str, tmp_path: Path):
 
 
 def test_what_scrolls_has_a_name(text: str) -> None:
-    """The Tab key stops there on a narrow page: a picture has its description, a table its caption, and one without the title of its section."""
+    """The Tab key stops there on a narrow page: a picture has its description, a table its caption,
+    and one without the title of its section."""
     scrolled = re.findall(r'<(?:figure class="chart wide"|div class="scroll")([^>]*)>', text)
     assert len(scrolled) > 8
     assert [s for s in scrolled if not re.search(r'aria-label="[^"]+"', s)] == []
@@ -260,7 +261,8 @@ def test_without_measurements_or_file(run: Run, alone: str, temperatures: int):
 
 
 def test_what_was_measured_between_the_ends_of_a_run_is_shown(run: Run):
-    """It was said to be missing "for want of a run at its temperature", beside a run at just that one, as of the free shaft at 20 of 15 to 25 C."""
+    """It was said to be missing "for want of a run at its temperature", beside a run at just that
+    one, as of the free shaft at 20 of 15 to 25 C."""
     campaign = other_campaign([ModeRow("a", 1, "axial", 1010.0, 1.0)], temperature=40.0)
     cold, hot = run.steps[0], run.steps[-1]
     point = replace(hot.point, condition=replace(hot.point.condition, temperature=40.0))
@@ -298,7 +300,8 @@ def test_changed_spindle_is_told(run: Run):
 
 @pytest.mark.parametrize(("scene", "told"), [("hdd_2003", "16.0 → "), ("five_bearing", "rear2 211 → 238, rear1 211 → 638, front3 382 → 926, front2 191 → 292, front1 191 → 234 N")])
 def test_the_preload_of_every_bearing_that_has_its_own(scene: str, told: str) -> None:
-    """That of one stood for all five, then five numbers and five names apart from them; preload that rises is not what is left of it, and no change is -0."""
+    """That of one stood for all five, then five numbers and five names apart from them; preload
+    that rises is not what is left of it, and no change is -0."""
     spindle = load(ROOT / "scenes" / scene)
     steps = [SimpleNamespace(point=operating_point(spindle, Condition(t))) for t in (20.0, 60.0)]
     cards = {what: (number, why) for what, number, why in headlines(SimpleNamespace(steps=steps), Table((), (), (20.0, 60.0), {}, ()))}  # type: ignore[arg-type]

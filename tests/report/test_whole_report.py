@@ -42,7 +42,8 @@ def test_a_ladder_only_where_modes_were_measured(spindle, table2):
 
 
 def test_what_a_scene_does_not_say_is_drawn_or_left_out_aloud(spindle, quick):
-    """Without imperfections plausible ones are drawn; without convection there is no warm-up; at one temperature no map, which the page did not tell."""
+    """Without imperfections plausible ones are drawn; without convection there is no warm-up; at
+    one temperature no map, which the page did not tell."""
     bare = replace(spindle, imperfections=Imperfections(), thermal=replace(spindle.thermal, convections=()))
     told = dict(turning(bare, [20.0], SPEED, lambda done: None))
     assert list(told) == ["Runout", "Warm-up", "Resonance map"]

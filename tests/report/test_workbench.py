@@ -1,4 +1,5 @@
-"""The workbench without its page: what it computes is what `compare` tells, the section moves as its bodies do, and it saves what can be run again."""
+"""The workbench without its page: what it computes is what `compare` tells, the section moves as
+its bodies do, and it saves what can be run again."""
 
 import runpy
 import subprocess
@@ -58,7 +59,8 @@ def test_without_tests_the_model_stands_beside_itself(alone):
 
 
 def test_a_row_is_one_mode_at_all_conditions(stiffly_mounted, monkeypatch):
-    """Numbered by frequency at each, the row of an axial mode held at 100 C one of the lateral ones that had passed it; and what a setting takes away is said."""
+    """Numbered by frequency at each, the row of an axial mode held at 100 C one of the lateral ones
+    that had passed it; and what a setting takes away is said."""
     monkeypatch.setattr(benches, "load", lambda file: replace(stiffly_mounted, temperatures=(20.0, 100.0)))
     crossing = benches.open_bench(SCENE)
     assert {m[5].kind for m in crossing.modes.values()} == {"axial"}

@@ -229,7 +229,8 @@ def test_saving_from_the_page(tab, served):
 
 @pytest.mark.slow
 def test_the_fit_to_the_lines_runs_to_its_end(chromium, tmp_path):
-    """On FRFs of another program with a bond that softens (12.5 nm/N): added, fitted by the button, with its gain told, and undone in one step."""
+    """On FRFs of another program with a bond that softens (12.5 nm/N): added, fitted by the button,
+    with its gain told, and undone in one step."""
     process, told = started(tmp_path, SCENE, DATA / "foreign_bond")
     chromium.size(1400, 1000)
     chromium.errors.clear()

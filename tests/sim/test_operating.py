@@ -46,7 +46,8 @@ def test_where_nothing_settles_the_condition_is_named():
 
 
 def test_a_shafts_modulus_follows_the_temperature():
-    """Its frequencies go with the root of E(T) / E(20 C), Poisson's ratio being the same, and effects act on top; where E is a constant nothing is touched."""
+    """Its frequencies go with the root of E(T) / E(20 C), Poisson's ratio being the same, and
+    effects act on top; where E is a constant nothing is touched."""
     shaft = load(ROOT / "scenes" / "free_shaft")
     warm = Condition(120.0)
     assert operating_point(shaft, warm).spindle is shaft

@@ -133,7 +133,8 @@ def test_steady_modes_of_a_warm_up_that_ends_early(stiffly_mounted, coarse):
 
 
 def test_modes_of_bearings_that_lose_contact_end(spindle, coarse):
-    """Rigid rings of little preload lose contact in hot air; the axial mode of 939 Hz went on as 163 Hz of a hub that rocks on what is left."""
+    """Rigid rings of little preload lose contact in hot air; the axial mode of 939 Hz went on as
+    163 Hz of a hub that rocks on what is left."""
     found = warm_up(told_preload(spindle, 8.0), SPEED, 20.0, 100.0)
     assert not found.steady.point.state.bearings[0].in_contact
     kinds = _followed_kinds(found)
@@ -187,7 +188,8 @@ def test_halving_the_steps_quarters_the_change(spindle, warm, model):
 
 
 def test_preload_drives_friction(spindle, coarse):
-    """With friction from load alone, each moment's heat is f1 P1 d_m omega with P1 = 0.9 cot(alpha) times its own preload, and the preload moves by a tenth."""
+    """With friction from load alone, each moment's heat is f1 P1 d_m omega with P1 = 0.9 cot(alpha)
+    times its own preload, and the preload moves by a tenth."""
     loaded = replace(spindle.thermal.friction, f0=0.0, f1=0.01)
     own = replace(spindle, thermal=replace(spindle.thermal, friction=loaded))
     warm = warm_up(own, SPEED, 20.0, duration=300.0, tolerance=0.2)
@@ -265,7 +267,8 @@ def test_a_start_beyond_a_law_is_told_with_scene_and_key(spindle, coarse, start)
 
 
 def test_rigid_rings_that_run_away_on_the_way_are_told(tmp_path):
-    """Hot inner rings in a cold housing, rigidly preloaded: time, bearing, loads by their names, ring temperatures and what they do, instead of a law that ends."""
+    """Hot inner rings in a cold housing, rigidly preloaded: time, bearing, loads by their names,
+    ring temperatures and what they do, instead of a law that ends."""
     scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace('preload_kind = "spring" ', 'preload_kind = "rigid" ')
     (tmp_path / "spindle.toml").write_text("".join(line for line in scene.splitlines(True) if not line.startswith(("sprung_", "preload_rate"))), encoding="utf-8")
     said = []
@@ -285,7 +288,8 @@ def test_rigid_rings_that_run_away_on_the_way_are_told(tmp_path):
 
 
 def test_without_a_steady_state_the_time_that_is_told_is_answered(tmp_path):
-    """Nothing was, not even of the first minute; the same moments as of a spindle that has one, and what is said of the end is of the last moment."""
+    """Nothing was, not even of the first minute; the same moments as of a spindle that has one, and
+    what is said of the end is of the last moment."""
     scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace('preload_kind = "spring" ', 'preload_kind = "rigid" ')
     (tmp_path / "spindle.toml").write_text("".join(line for line in scene.splitlines(True) if not line.startswith(("sprung_", "preload_rate"))), encoding="utf-8")
     found = warm_up(load(tmp_path), 120000 * RPM, 20.0, duration=3.0)

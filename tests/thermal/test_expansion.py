@@ -131,7 +131,8 @@ def test_wrong_region_temperatures_are_named(spindle):
 
 
 def test_strain_is_the_integral_of_the_law(spindle):
-    """20e-6 at 0, 24e-6 at 40 and 32e-6 /K at 80 C: from 20 C on, trapezoids by hand; so is the scalar form. Outside its range a law refuses."""
+    """20e-6 at 0, 24e-6 at 40 and 32e-6 /K at 80 C: from 20 C on, trapezoids by hand; so is the
+    scalar form. Outside its range a law refuses."""
     law = Law((0.0, 40.0, 80.0), (20e-6, 24e-6, 32e-6))
     metal = replace(spindle.materials["aluminium"], thermal_expansion=law)
     warm = np.array([0.0, 12.0, 40.0, 60.0, 80.0])
@@ -144,8 +145,8 @@ def test_strain_is_the_integral_of_the_law(spindle):
 
 @pytest.mark.slow
 def test_modulus_is_taken_at_the_temperature(spindle):
-    """A law that makes aluminium as soft at 60 C as another constant gives that constant's motions, within the reduced basis (`thermal.reduced`) at
-    this tolerance of 1e-3. Outside its range a law refuses."""
+    """A law that makes aluminium as soft at 60 C as another constant gives that constant's motions, within
+    the reduced basis (`thermal.reduced`) at this tolerance of 1e-3. Outside its range a law refuses."""
     aluminium = spindle.materials["aluminium"]
 
     def with_modulus(modulus):

@@ -50,7 +50,8 @@ def test_heat_is_torque_times_speed_and_zero_at_rest(spindle):
 
 
 def test_load_of_a_row(spindle):
-    """P1 = max(0.9 F_a cot(alpha) - 0.1 F_r, F_r): near the catalogues' 3.3 F_a - 0.1 F_r at 15 degrees and F_a - 0.1 F_r at 40; a radial load alone counts whole."""
+    """P1 = max(0.9 F_a cot(alpha) - 0.1 F_r, F_r): near the catalogues' 3.3 F_a - 0.1 F_r at 15
+    degrees and F_a - 0.1 F_r at 40; a radial load alone counts whole."""
     b = spindle.bearings[0]
     assert load(b, -16.0) == pytest.approx(0.9 * 16 / np.tan(np.radians(24.51)))
     assert load(replace(b, contact_angle=np.radians(15)), 100.0, 50.0) == pytest.approx(3.3 * 100 - 5, rel=0.03)
@@ -95,7 +96,8 @@ def test_between_counter_rotating_rings_both_grow(spindle):
 
 
 def test_viscosity_between_its_entries(spindle):
-    """Of an oil of 26 mm2/s at 40 C and 5.1 at 100 C told at both alone, every entry of the table that the standard gives; of a straight line they would be a third off."""
+    """Of an oil of 26 mm2/s at 40 C and 5.1 at 100 C told at both alone, every entry of the table
+    that the standard gives; of a straight line they would be a third off."""
     table = spindle.thermal.friction.viscosity
     oil = Viscosity((40.0, 100.0), (26e-6, 5.1e-6))
     for t, v in zip(table.temperature, table.value, strict=True):

@@ -190,7 +190,8 @@ def lubricated(model, **friction):
 
 
 def test_slowest_decay_of_two_lumps(spindle):
-    """Each ring is one lump: C T' = -(K - H' b b^T) T with b = (1/2, 1/2); Palmgren's H goes with nu^(2/3), so H' = 2/3 H nu' / nu, a fifth of the film."""
+    """Each ring is one lump: C T' = -(K - H' b b^T) T with b = (1/2, 1/2); Palmgren's H goes with
+    nu^(2/3), so H' = 2/3 H nu' / nu, a fifth of the film."""
     conductance, omega = 0.25, 7200 * RPM
     model = lubricated(two_rings(spindle, conductance), f0=2.0, f1=0.0, viscosity=Law((20.0, 60.0), (100e-6, 40e-6)))
     friction_at_40 = 1e-10 * 2.0 * (70 * 7200) ** (2 / 3) * 9.1**3 * omega  # W, nu = 70 mm2/s, d_m = 9.1 mm
@@ -281,7 +282,8 @@ def test_balance_of_heat_in_time(spindle, reference):
 
 
 def test_a_jacket_takes_heat_at_its_own_temperature(spindle, reference):
-    """Motor, friction and what a coolant 15 K below the air takes in balance, steady and in every step; a coolant as warm as the air is air; what lies behind an air gap feels neither."""
+    """Motor, friction and what a coolant 15 K below the air takes in balance, steady and in every
+    step; a coolant as warm as the air is air; what lies behind an air gap feels neither."""
     drive = heat.running(spindle, 25.0, 7200 * RPM)
 
     def jacketed(coolant):

@@ -91,7 +91,8 @@ def test_raceways_of_a_tandem_pair_meet(tube):
 
 
 def test_heat_enters_each_raceway_where_it_is(tube):
-    """Half of each bearing's friction enters the tube, at its own raceway and nowhere else; the quick reading agrees with the field's expansion."""
+    """Half of each bearing's friction enters the tube, at its own raceway and nowhere else; the
+    quick reading agrees with the field's expansion."""
     model = conduction.model(tube, influence(tube).sections)
     load = {"lower": 0.0, "upper": 0.0}
     field = heat.steady(model, heat.Running(25.0, 754.0, load))

@@ -1,5 +1,5 @@
-"""A reader tried in a forked process. Compiled libraries may end the process that reads a damaged file, so the program starts another for each: half a
-second, where a fork takes some milliseconds. The code is the same; only how its process comes to be is not.
+"""A reader tried in a forked process. Compiled libraries may end the process that reads a damaged file, so the program starts
+another for each: half a second, where a fork takes some milliseconds. The code is the same; only how its process comes to be is not.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ class Hangs(Exception):
 
 
 def tried_apart(act: Callable[[], object], named: tuple[type[Exception], ...]) -> None:
-    """`act()` in a forked process: ends well, or raises what it raised there where that is one of `named`; an AssertionError for anything else.
+    """`act()` in a forked process: ends well, or raises what it raised there where that is one of
+    `named`; an AssertionError for anything else.
 
     This process must not have used what starts threads of its own (Rerun's reader does): a fork would wait for them.
     """

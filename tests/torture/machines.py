@@ -140,12 +140,14 @@ def beside_the_section(name: str) -> tuple:
 
 
 heated = st.one_of(moved(WITH_A_SECTION, 8, beside_the_section), moved(WITH_A_SECTION, 8, beside_the_section), moved(WITH_A_SECTION, 3))
-"""Machines with a temperature field: two of three on their drawn section, one with any of its numbers moved, whose finite elements take seconds."""
+"""Machines with a temperature field: two of three on their drawn section, one with any of its
+numbers moved, whose finite elements take seconds."""
 
 
 @st.composite
 def fields(draw):
-    """A temperature for every region (C), some kelvins about one that is drawn from where the scenes are made for; a function of the spindle."""
+    """A temperature for every region (C), some kelvins about one that is drawn from where the
+    scenes are made for; a function of the spindle."""
     seed, spread, middle = draw(st.integers(0, 10**6)), draw(st.sampled_from([0.0, 0.5, 5.0, 20.0])), draw(st.one_of(_f(15, 65), _f(-40, 120)))
 
     def of(spindle):

@@ -1,5 +1,5 @@
-"""Every reader of files that come from others: whole files to begin with (`wholes`), and what it does with one. The property tests, the fuzzer (`tests/fuzz`)
-and `tests/faults` share them.
+"""Every reader of files that come from others: whole files to begin with (`wholes`), and what it
+does with one. The property tests, the fuzzer (`tests/fuzz`) and `tests/faults` share them.
 """
 
 from __future__ import annotations

@@ -53,7 +53,8 @@ def keeps_the_laws(point):
 
 
 def reciprocal(point, frequency):
-    """H_ij at one sense of rotation is H_ji at the other; at rest, of one and the same matrix. Of up to `SOME` degrees of freedom: a fine mesh has thousands."""
+    """H_ij at one sense of rotation is H_ji at the other; at rest, of one and the same matrix. Of
+    up to `SOME` degrees of freedom: a fine mesh has thousands."""
     if any(np.any(b.damping != b.damping.T) for b in point.state.all_bearings):
         return
     w = 2 * np.pi * frequency

@@ -10,8 +10,9 @@ a positive M pushes the ball towards a larger outer angle. C and M depend on bot
 between ball and outer groove and the inner one by c. With G = dR/dl, J = dP/dl, and S = -dR/dc, H = dP/dc where the gap is held,
 dR/dc = -(S + G), and the ring sees k = J (S + G)^-1 S + H (S + G)^-1 G.
 
-A ball by itself orbits as fast as rolling at its own two angles makes it. The balls of a row share a cage, and orbit with its speed, the mean of those (`ball_row`): were
-each as fast as it would roll, the centrifugal forces of a row whose rings are moved aside would add up to a force that only one of its rings feels.
+A ball by itself orbits as fast as rolling at its own two angles makes it. The balls of a row share a cage,
+and orbit with its speed, the mean of those (`ball_row`): were each as fast as it would roll, the centrifugal
+forces of a row whose rings are moved aside would add up to a force that only one of its rings feels.
 
 With M the friction is no derivative of an energy, so k, the exact derivative of P, is not symmetric: for a row of the reference spindle the
 radial-tilt entries differ by 7e-9 of their size at 7200 rpm, 7e-5 at 30,000, as the fourth power of the speed.
@@ -120,13 +121,14 @@ def _approached(ball: HeavyBall, line: Vector, tolerance: float, least: float, s
 
 
 def _drifted(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Balance:
-    """Where a ball comes to that the resultant on it pushes through something viscous: pseudo-transient continuation (Kelley and Keyes 1998).
+    """Where a ball comes to that the resultant on it pushes through something viscous:
+    pseudo-transient continuation (Kelley and Keyes 1998).
 
-    Rings that turn against each other leave a ball little centrifugal force and much moment. Where the friction 2 M / D across the outer race is more than
-    the centrifugal force has across it, it carries a loose ball from the crossing of `_start` over to the other one, where the drift begins, and a lightly pressed
-    ball as far. On the way S + G is not positive, and halved steps end where it is singular and the resultant least, but not nothing. A drift may pass through a
-    larger one. Each step is implicit, against a drag that lets the resultant carry the ball `LONGEST` at most and is twice what S + G falls short of nothing;
-    it is Newton's at the end.
+    Rings that turn against each other leave a ball little centrifugal force and much moment. Where the friction 2 M / D across the
+    outer race is more than the centrifugal force has across it, it carries a loose ball from the crossing of `_start` over to the other
+    one, where the drift begins, and a lightly pressed ball as far. On the way S + G is not positive, and halved steps end where it is
+    singular and the resultant least, but not nothing. A drift may pass through a larger one. Each step is implicit, against a drag that
+    lets the resultant carry the ball `LONGEST` at most and is twice what S + G falls short of nothing; it is Newton's at the end.
     """
     longest = LONGEST * hypot(*line)
     here = balance(ball, _other_side(_start(ball, line), line), line)
@@ -146,8 +148,9 @@ def _drifted(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> B
 def _start(ball: HeavyBall, line: Vector) -> Vector:
     """Where the centre of a ball may be: between two races that press it; flung outward between two that do not.
 
-    Then its centre lies where two circles meet, about the groove centres, each as far as its race is under the centrifugal force; or, where a ball
-    on the outer race alone clears the inner one, on the radius of the outer groove's centre. Steps along a loose ball's circles would be many.
+    Then its centre lies where two circles meet, about the groove centres, each as far as its race
+    is under the centrifugal force; or, where a ball on the outer race alone clears the inner one,
+    on the radius of the outer groove's centre. Steps along a loose ball's circles would be many.
     """
     length = hypot(*line)
     along = -line[0] / length, abs(line[1]) / length
@@ -212,8 +215,8 @@ def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
 
 
 class Driven(NamedTuple):
-    """What a ball that orbits with the cage has to do with its speed: its own by rolling (rad/s), the derivatives of that by the outer groove's centre (2,) and by the cage's speed, and
-    of the force on the outer ring (2,) by the cage's speed."""
+    """What a ball that orbits with the cage has to do with its speed: its own by rolling (rad/s), the derivatives of that
+    by the outer groove's centre (2,) and by the cage's speed, and of the force on the outer ring (2,) by the cage's speed."""
 
     speed: float
     by_line: Vector

@@ -1,4 +1,5 @@
-"""What makes a ball heavy at speed: how fast it orbits by rolling, its centrifugal force and its gyroscopic moment, and how these go with both contact angles.
+"""What makes a ball heavy at speed: how fast it orbits by rolling, its centrifugal force and its
+gyroscopic moment, and how these go with both contact angles.
 
 Plain numbers, as in `balance`.
 """
@@ -17,7 +18,8 @@ LEAST_ROLLING = 1e-9  # of 1 + cos(a_i - a_o), which is 2 where both contacts li
 
 @dataclass(frozen=True)
 class BallInertia:
-    """What makes a ball heavy at speed; `share` scales centrifugal force and gyroscopic moment (0 none, 1 full). It orbits with a `cage` of that speed (rad/s), or as it rolls."""
+    """What makes a ball heavy at speed; `share` scales centrifugal force and gyroscopic moment (0
+    none, 1 full). It orbits with a `cage` of that speed (rad/s), or as it rolls."""
 
     diameter: float
     pitch_diameter: float
@@ -44,11 +46,11 @@ class BallInertia:
     def orbit(self, outer: Vector, inner: Vector) -> Orbit:
         """Speed of the cage about the axis by rolling, for the cosine and sine of the ball's `outer` and `inner` contact angles a_o, a_i.
 
-        Kinematics of Harris 1991, ch. 8: rolling at both races and no spin at the outer, tan beta = sin a_o / (cos a_o + gamma). A ball that
-        spins with w about an axis at beta to z while it orbits with the cage's speed has dH/dt = cage z x H = J w cage sin(beta) about the
-        direction of travel. Rolling is (cage - outer speed) (1 + gamma cos a_o) / cos(a_o - beta) = (inner speed - cage) (1 - gamma cos a_i) /
-        cos(a_i - beta) = -gamma w; with beta put in, the cage is behind the outer ring by relative (1 - gamma cos a_i) / (1 + cos(a_i - a_o))
-        and what is left of w sin(beta) is that sin a_o / gamma.
+        Kinematics of Harris 1991, ch. 8: rolling at both races and no spin at the outer, tan beta = sin a_o / (cos a_o + gamma).
+        A ball that spins with w about an axis at beta to z while it orbits with the cage's speed has dH/dt = cage z x H = J w
+        cage sin(beta) about the direction of travel. Rolling is (cage - outer speed) (1 + gamma cos a_o) / cos(a_o - beta) =
+        (inner speed - cage) (1 - gamma cos a_i) / cos(a_i - beta) = -gamma w; with beta put in, the cage is behind the outer
+        ring by relative (1 - gamma cos a_i) / (1 + cos(a_i - a_o)) and what is left of w sin(beta) is that sin a_o / gamma.
         """
         (co, so), (ci, si) = outer, inner
         gamma = self.diameter / self.pitch_diameter
@@ -86,7 +88,8 @@ class Orbit(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Centrifugal force C (N) and gyroscopic moment M (N m) of a ball, their derivatives by the outer and the inner contact angle, and those by the cage's speed with both held."""
+    """Centrifugal force C (N) and gyroscopic moment M (N m) of a ball, their derivatives by the
+    outer and the inner contact angle, and those by the cage's speed with both held."""
 
     centrifugal: float
     centrifugal_by_outer: float

@@ -1,4 +1,5 @@
-"""The looks of a MuJoCo model: solids, balls, lights and cameras. MuJoCo's enumerations are its own integers, so that this file need not import it."""
+"""The looks of a MuJoCo model: solids, balls, lights and cameras. MuJoCo's enumerations are its own
+integers, so that this file need not import it."""
 
 from __future__ import annotations
 

@@ -63,7 +63,8 @@ def shaft_meshes(spindle: Spindle) -> list[RegionMesh]:
 
 
 def plate_meshes(spindle: Spindle) -> list[RegionMesh]:
-    """A plate for every body that no region shows: a ring as wide as its measuring points lie, its top at their height, or a disc of its inertia."""
+    """A plate for every body that no region shows: a ring as wide as its measuring points lie, its
+    top at their height, or a disc of its inertia."""
     shown = set(region_bodies(spindle).values()) | {name for shaft in spindle.structure.shafts for name in shaft.bodies}
     return [
         RegionMesh(f"{body.name} plate", body.name, *revolve([plate(spindle, body)]), (*PLATE, 1.0))
@@ -134,7 +135,8 @@ def _merged_grid(tiles: Sequence[Cell]) -> tuple[Array, Array, NDArray[np.bool_]
 
 
 def plate(spindle: Spindle, body: Body) -> Cell:
-    """The ring plate that stands for a body of which no region is drawn; one whose points all lie on the axis is a disc of its mass and inertia."""
+    """The ring plate that stands for a body of which no region is drawn; one whose points all lie
+    on the axis is a disc of its mass and inertia."""
     reach = extent(spindle)[0]
     points = [p.position for p in spindle.points if p.body == body.name]
     if points and max(float(np.hypot(x, y)) for x, y, _ in points) < 1e-3 * reach:

@@ -16,7 +16,8 @@ STEPS = 3  # cylinders that draw a cone
 
 
 def slices(shaft: Shaft) -> dict[str, list[Cell]]:
-    """Rectangles of every node's slice, from half way to its neighbours on both sides, by the node's body; cones in `STEPS` cylinders, rectangular sections (`boxes`) by half their width."""
+    """Rectangles of every node's slice, from half way to its neighbours on both sides, by the
+    node's body; cones in `STEPS` cylinders, rectangular sections (`boxes`) by half their width."""
     middles = [(a + b) / 2 for a, b in zip(shaft.nodes, shaft.nodes[1:], strict=False)]
     edges = [shaft.nodes[0], *middles, shaft.nodes[-1]]
     found: dict[str, list[Cell]] = {}

@@ -1,7 +1,7 @@
 """The Rerun log of a study: every number of it as a series over the timeline `case`, its figures, and its summary.
 
-`series/` holds natural frequencies by mode and what else each case gives, a line for each condition (of a fleet the error of each campaign);
-`numbers/rows` holds the same bit for bit, and `report.log.read` reads them back.
+`series/` holds natural frequencies by mode and what else each case gives, a line for each condition (of a fleet
+the error of each campaign); `numbers/rows` holds the same bit for bit, and `report.log.read` reads them back.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ Told = dict[str, Any]
 
 
 def write_study_log(spindles: Sequence[Spindle], told: Mapping[str, Any], table: pa.Table, drawn: Mapping[str, Figure], path: Path) -> None:
-    """Write the log, whole or not at all; `told` is the study's summary, `drawn` its figures by name. BadInput if its folder does not exist."""
+    """Write the log, whole or not at all; `told` is the study's summary, `drawn` its figures by
+    name. BadInput if its folder does not exist."""
     series = series_of(table)
     about = {key: told[key] for key in ("title", "kind", "cases", "rows", "errors")} | provenance(spindles[0])
     about |= {key: ", ".join(provenance(s)[key] for s in spindles) for key in ("scene", "scene_hash")}

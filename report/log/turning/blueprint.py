@@ -48,7 +48,8 @@ def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
 
 
 def reach(largest: float) -> float:
-    """The next round number above the `largest` value (nm) of a panel, in which it stands from minus to plus that: an axis so low has no number but 0."""
+    """The next round number above the `largest` value (nm) of a panel, in which it stands from
+    minus to plus that: an axis so low has no number but 0."""
     if not largest > STANDS:
         return 1.0
     decade = 10.0 ** np.floor(np.log10(largest))

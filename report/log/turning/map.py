@@ -70,7 +70,8 @@ def _several(found: ResonanceMap) -> bool:
 
 
 def log_pictures(recording: rr.RecordingStream, found: ResonanceMap) -> None:
-    """The Campbell diagram of every temperature; coincidences and the diagram over temperature, with a bar at the temperature of the moment."""
+    """The Campbell diagram of every temperature; coincidences and the diagram over temperature,
+    with a bar at the temperature of the moment."""
     times = _over_temperature(found)
     with rc_context(STYLE):
         log_figures(recording, "campbell", times, [campbell(found, k, CAMPBELL) for k in range(len(found.temperatures))])

@@ -66,7 +66,8 @@ def log_signals(recording: rr.RecordingStream, runout: Runout) -> None:
 
 
 def log_orbit(recording: rr.RecordingStream, runout: Runout) -> None:
-    """The orbit in pieces of an eighth of a revolution, which stay as time goes on; the repeatable part, and what all revolutions cover, from the start."""
+    """The orbit in pieces of an eighth of a revolution, which stay as time goes on; the repeatable
+    part, and what all revolutions cover, from the start."""
     cut = runout.by_lines
     x, y = (cut.value[i].ravel() for i in (0, 1))
     pieces, ends = orbit_pieces(x, y, len(cut.angle))

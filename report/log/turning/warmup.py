@@ -1,7 +1,9 @@
-"""The Rerun log of a warm-up: the section heats up on the timeline `time`, and temperatures, preload, friction and natural frequencies beside it.
+"""The Rerun log of a warm-up: the section heats up on the timeline `time`, and temperatures,
+preload, friction and natural frequencies beside it.
 
-`numbers/warmup` holds what `warmup.csv` holds, a component a column of it and a row a time step, as computed; the series for the eye are the
-same numbers under the names of warmup.png: of regions of nearly one temperature their mean, natural frequencies as their change since the start. `report.log.read` reads it back.
+`numbers/warmup` holds what `warmup.csv` holds, a component a column of it and a row a time step, as
+computed; the series for the eye are the same numbers under the names of warmup.png: of regions of nearly one
+temperature their mean, natural frequencies as their change since the start. `report.log.read` reads it back.
 """
 
 from __future__ import annotations
@@ -146,7 +148,8 @@ def key_to_colours(warmup: Warmup) -> rr.Points3D:
 
 
 def summary(warmup: Warmup) -> str:
-    """Markdown: bearings and natural frequencies at the start, at the end and in the steady state, as far as there is one, and where the heat went."""
+    """Markdown: bearings and natural frequencies at the start, at the end and in the steady state,
+    as far as there is one, and where the heat went."""
     spindle, lost = warmup.spindle, lost_contact(warmup)
     moments = warmup.every
     shown = sorted({0, len(warmup.moments) - 1, len(moments) - 1})

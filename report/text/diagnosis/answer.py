@@ -91,8 +91,8 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
 
 
 def in_scene(parameters: Sequence[Nuisance], evidence: Evidence) -> Array:
-    """Mean (P,) of the nuisances, in their reference widths, where `kinds_of.UNWRITTEN` are nothing: those no scene holds, and a tolerance that was fitted beside them would leave half of the two
-    behind. The conditional mean of the Gaussian, m - C_bu C_uu^-1 m_u.
+    """Mean (P,) of the nuisances, in their reference widths, where `kinds_of.UNWRITTEN` are nothing: those no scene holds, and a
+    tolerance that was fitted beside them would leave half of the two behind. The conditional mean of the Gaussian, m - C_bu C_uu^-1 m_u.
     """
     mean, covariance = evidence.mean[: len(parameters)], evidence.covariance
     wide = np.diag(covariance)[: len(parameters)] > 0
@@ -166,8 +166,8 @@ def named(effect: Effect, name: str, value: float, spindle: Spindle) -> dict[str
 
 
 def told_values(c: Candidate, k: int, spindle: Spindle) -> dict[str, dict[str, Any]]:
-    """Values of effect `k` of an explanation, with errors that hold whichever way it acts: about the value in the likeliest way, the mean square over all of them. What names
-    something has its probability, and the `others` theirs, where they are not nothing."""
+    """Values of effect `k` of an explanation, with errors that hold whichever way it acts: about the value in the likeliest way,
+    the mean square over all of them. What names something has its probability, and the `others` theirs, where they are not nothing."""
     effect = c.told.mechanisms[k].effect
     rows, numbers = parameters_of(c.told, k), {p.name for p in effect.parameters if p.choices}
     ways = [(parameters_of(h, k), share) for h, share in c.ways] or [(rows, 1.0)]
@@ -185,8 +185,9 @@ def told_values(c: Candidate, k: int, spindle: Spindle) -> dict[str, dict[str, A
 
 
 def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:
-    """Values with errors of mechanism `k` of an explanation: one size for all tests, its choices and its shape parameters. Beside shapes it is of the sizes at the fitted point, as they are: where the valley
-    between both bends, the mean of the quadratic about that point is no size of these shapes."""
+    """Values with errors of mechanism `k` of an explanation: one size for all tests, its choices and
+    its shape parameters. Beside shapes it is of the sizes at the fitted point, as they are: where the
+    valley between both bends, the mean of the quadratic about that point is no size of these shapes."""
     m, own = h.mechanisms[k], h.evidence
     size, sd = one_size(m, h.fit.roots[k], h.fit.sizes[k] if m.shape else own.sizes[k], own.size_covariance[k])
     rows: dict[str, dict[str, Any]] = {m.size.name: {"value": size, "sd": sd, "unit": m.size.unit}}

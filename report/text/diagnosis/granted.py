@@ -17,7 +17,8 @@ UNITS = {kinds_of.TEMPERATURE: (1.0, "K"), kinds_of.MISS: (1e3, "mm"), kinds_of.
 
 
 def granted_words(d: Diagnosis, drawn: float) -> str:
-    """Where nothing is missing although the drawing is off by `drawn` standard errors, which `compare` calls no agreement: what took the error to what it is; else empty."""
+    """Where nothing is missing although the drawing is off by `drawn` standard errors, which
+    `compare` calls no agreement: what took the error to what it is; else empty."""
     base = d.search.base
     if d.verdict.word != "none" or drawn < ALMOST:
         return ""

@@ -70,7 +70,8 @@ def _change_words(p: Drift) -> str:
 
 
 def _odd_one(p: Drift) -> int | None:
-    """The one test that differs from each of the others, by `ODD` of its errors, where these agree among themselves; None where there is none."""
+    """The one test that differs from each of the others, by `ODD` of its errors, where these agree
+    among themselves; None where there is none."""
     if len(p.change) < 4:
         return None
     by = apart_by(p.change, p.covariance)
@@ -247,8 +248,9 @@ def _values(candidate: dict[str, Any]) -> str:
 
 
 def spread_words(candidate: dict[str, Any], name: str) -> str:
-    """Of the size of an effect whose law the data do not have, by the `name` of its parameter: from which to which it goes over the tests, and its mean last, which says
-    little then, and nothing where it is of the law assumed and the sizes of one of the data's own; empty of all other parameters."""
+    """Of the size of an effect whose law the data do not have, by the `name` of its parameter: from
+    which to which it goes over the tests, and its mean last, which says little then, and nothing where
+    it is of the law assumed and the sizes of one of the data's own; empty of all other parameters."""
     effect = name.split(".", 1)[0]
     first = next(k for k in candidate["parameters"] if k.startswith(f"{effect}."))  # an effect's size comes first
     if name != first or candidate["departure_from_law"].get(effect, 0.0) < DEPARTS:

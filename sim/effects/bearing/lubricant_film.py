@@ -53,7 +53,8 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
 def films(
     spindle: Spindle, b: Bearing, speed: float, temperature: float, pressure_viscosity: float = PRESSURE_VISCOSITY
 ) -> tuple[float, float]:
-    """Central film (m) at the inner and the outer race, of a fully flooded contact under the reference preload; `speed` (rad/s) of the rings against each other."""
+    """Central film (m) at the inner and the outer race, of a fully flooded contact under the
+    reference preload; `speed` (rad/s) of the rings against each other."""
     ball, ring = (
         (spindle.materials[name].youngs_modulus(temperature), spindle.materials[name].poisson_ratio)
         for name in (b.ball_material, b.ring_material)

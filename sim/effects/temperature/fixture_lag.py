@@ -1,4 +1,5 @@
-"""Parts short of chamber temperature: the standing part, bolted to a fixture that has not soaked, has risen less than the turning part in the air."""
+"""Parts short of chamber temperature: the standing part, bolted to a fixture that has not soaked,
+has risen less than the turning part in the air."""
 
 from __future__ import annotations
 

@@ -15,7 +15,8 @@ def temperatures(spindle: Spindle, condition: Condition, values: Values, by_regi
 
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
-    """Balls and rollers taken from the mean of their rings' temperatures to their own, the turning groove from its ring's to half way to the balls'."""
+    """Balls and rollers taken from the mean of their rings' temperatures to their own, the turning
+    groove from its ring's to half way to the balls'."""
     missing = share(condition, values)
     if missing == 0.0:
         return by_bearing

@@ -61,7 +61,8 @@ def levelled(spindle: Spindle, regions: tuple[str, ...], rise: Array) -> Array:
 
 
 def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
-    """Friction heat (bearings,) in W where every lubricant has the temperature that all of it makes. OutsideRange where that is beyond its viscosity's law."""
+    """Friction heat (bearings,) in W where every lubricant has the temperature that all of it
+    makes. OutsideRange where that is beyond its viscosity's law."""
     loads = friction.loads(spindle)
     bearings = tuple((b, relative_speed(spindle, b, condition.speed), loads[b.name]) for b in spindle.ringed)
     return _heat(spindle.thermal.friction, bearings, condition.temperature, unit)
@@ -69,7 +70,8 @@ def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
 
 @lru_cache(maxsize=256)
 def _heat(law: Friction, bearings: tuple[tuple[Bearing | RollerBearing, float, float], ...], temperature: float, unit: UnitRise) -> Array:
-    """Of bearings with the speed of their rings and their load, where all is at one temperature but for their own heat; read only. Spindles that differ in their structure ask for the same."""
+    """Of bearings with the speed of their rings and their load, where all is at one temperature but
+    for their own heat; read only. Spindles that differ in their structure ask for the same."""
     every, speeds, _ = zip(*bearings, strict=True)
     by_name, cold = {b.name: load for b, _, load in bearings}, np.full(len(bearings), temperature)
     low, high = law.viscosity.temperature[0], law.viscosity.temperature[-1]

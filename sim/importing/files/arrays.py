@@ -49,7 +49,8 @@ REFUSED = 3  # exit code of a process that has said why
 
 
 def _apart(file: Path) -> dict[str, Any]:
-    """What another process reads of a `.mat` file: the compiled readers of SciPy and HDF5 break off the process that they are in on some damaged files, or never end."""
+    """What another process reads of a `.mat` file: the compiled readers of SciPy and HDF5 break off
+    the process that they are in on some damaged files, or never end."""
     with TemporaryDirectory() as place:
         found = Path(place) / "arrays.npz"
         done = read_apart(file, ".mat files", APART, str(file), str(found), str(LARGEST), ends=(0, REFUSED))

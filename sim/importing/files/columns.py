@@ -101,8 +101,8 @@ def _is_axis(name: str, value: Any, kind: str, settings: FileForm) -> bool:
 
 
 def _pieces(column: Column, lists: Mapping[str, list[End] | None], length: int, hits: int) -> list[Column]:
-    """A matrix of FRFs as single ones, its last axis that of the lines; responses over time by channel, as many `hits` as their force has; what is
-    no matrix as it is."""
+    """A matrix of FRFs as single ones, its last axis that of the lines; responses over time by
+    channel, as many `hits` as their force has; what is no matrix as it is."""
     value, role = column.values, column.role
     if role is None or role.kind not in ("H", "coherence", "sd") or value.ndim == 1:
         if role is not None and role.kind == "response" and value.ndim > 1:

@@ -28,7 +28,8 @@ ROLES = 'frequency, time, "H(3,1)" with real, imaginary, magnitude, decibel or p
 
 @dataclass(frozen=True)
 class Role:
-    """`kind`: frequency, time, H, coherence, sd, force, response or ignore; `part` of an H; `unit` as written in brackets; `level` is what 0 dB are of it."""
+    """`kind`: frequency, time, H, coherence, sd, force, response or ignore; `part` of an H; `unit`
+    as written in brackets; `level` is what 0 dB are of it."""
 
     kind: str
     part: str = ""
@@ -107,7 +108,8 @@ def end(text: str) -> End:
 
 
 def told_of_end(heading: End, told: str | int | None) -> End:
-    """An end as its heading has it, with what a mapping tells beside: all of one that the heading leaves open, and the direction of the same one."""
+    """An end as its heading has it, with what a mapping tells beside: all of one that the heading
+    leaves open, and the direction of the same one."""
     if told is None:
         return heading
     own = end(str(told))

@@ -73,8 +73,8 @@ def _is_number(lines: list[str]) -> bool:
 
 
 def from_modes(file: Path, settings: FileForm) -> Content:
-    """The modes of a table, whether its dampings are in per cent where that is open, and which of its columns are left out. Raises `BadInput` naming the line for what is no number, or no
-    possible one."""
+    """The modes of a table, whether its dampings are in per cent where that is open, and which of its
+    columns are left out. Raises `BadInput` naming the line for what is no number, or no possible one."""
     found = headings(file)
     assert found is not None
     named, separator, first = found
@@ -120,7 +120,8 @@ def from_modes(file: Path, settings: FileForm) -> Content:
 
 
 def _damping(where: str, value: Mapping[str, float], called: Mapping[str, str], settings: FileForm) -> tuple[float | None, float | None]:
-    """The damping ratio of a mode and its standard error, None where they are not told; per cent are told by the heading, or by the mapping."""
+    """The damping ratio of a mode and its standard error, None where they are not told; per cent
+    are told by the heading, or by the mapping."""
     percent = "percent" in value or settings.damping_unit == "percent"
     key = "percent" if "percent" in value else "damping"
     if key not in value:

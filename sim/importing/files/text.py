@@ -87,7 +87,8 @@ def _with_values(lines: list[tuple[int, str]], separator: str | None, comma: boo
 
 
 def _refuse_commas(file: Path, above: list[str], separator: str | None, line: str) -> None:
-    """`BadInput` where commas stand between columns and in numbers: as many headings as every two cells of whole numbers, none with a decimal point."""
+    """`BadInput` where commas stand between columns and in numbers: as many headings as every two
+    cells of whole numbers, none with a decimal point."""
     cells = _cells(line, ",")
     halves = {1: cells[::2], 0: cells[1::2]}  # of the first column whole numbers alone, maybe
     count = len(_headings(above[-1], ",")) if above and separator == "," else 0
@@ -176,7 +177,8 @@ def _number(text: str, comma: bool) -> float | complex:
 
 
 def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, comma: bool) -> tuple[list[list[float | complex]], int]:
-    """The rows of the last block of numbers, and the index of its first line. The first one may hold what is no number, where its axis begins at 0."""
+    """The rows of the last block of numbers, and the index of its first line. The first one may
+    hold what is no number, where its axis begins at 0."""
     rows: list[list[float | complex]] = []
     for index in range(len(lines) - 1, -1, -1):
         number, line = lines[index]
@@ -207,7 +209,8 @@ def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, co
 
 
 def _refuse_among(file: Path, until: Sequence[tuple[int, str]], before: Sequence[list[float | complex] | None], after: list[float | complex]) -> None:
-    """`BadInput` where the last of some lines is no row, and the few rows `before` it go on in the one `after` it: as many numbers, the first of which rises."""
+    """`BadInput` where the last of some lines is no row, and the few rows `before` it go on in the
+    one `after` it: as many numbers, the first of which rises."""
     first = [abs(row[0]) for row in before if row is not None and len(row) == len(after)]
     if len(first) == FEW and all(a < b for a, b in pairwise([*first, abs(after[0])])):
         number, line = until[-1]

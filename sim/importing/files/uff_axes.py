@@ -1,4 +1,5 @@
-"""Axes and units of the functions (58) of a UFF file: lines in Hz, steps in s, and each side of an ordinate, by label or over the factors of set 164."""
+"""Axes and units of the functions (58) of a UFF file: lines in Hz, steps in s, and each side of an
+ordinate, by label or over the factors of set 164."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ TIME, FREQUENCY = 17, 18
 
 
 def frequencies(file: Path, where: str, record: Mapping[str, Any], settings: FileForm) -> Array:
-    """The lines (n,) of a function in Hz; where the mapping has a step, by that. `BadInput` for an abscissa that is no frequency in a unit that is known."""
+    """The lines (n,) of a function in Hz; where the mapping has a step, by that. `BadInput` for an
+    abscissa that is no frequency in a unit that is known."""
     if settings.step_Hz is not None:
         return (settings.start_Hz or 0.0) + settings.step_Hz * np.arange(float(len(record["data"])))
     factor = units.of_frequency(label(record, "abscissa") or "Hz") if record["abscissa_spec_data_type"] in (FREQUENCY, *UNKNOWN) else None
@@ -56,7 +58,8 @@ def label(record: Mapping[str, Any], side: str) -> str:
 
 
 def in_unit(file: Path, record: Mapping[str, Any], side: str, kind: int, system: Mapping[str, Any] | None) -> tuple[str, float]:
-    """The unit of one side, and the factor to it: that of its label, or without one that of SI, over the factor of the file's set 164, where its `kind` is known."""
+    """The unit of one side, and the factor to it: that of its label, or without one that of SI,
+    over the factor of the file's set 164, where its `kind` is known."""
     told = label(record, side)
     if told or system is None or kind not in KINDS:
         return told, 1.0

@@ -57,7 +57,8 @@ def _alike(one: End, other: End) -> bool:
 
 
 def _lines_of_both(curve: Curve, coherence: Curve) -> tuple[np.ndarray, np.ndarray] | None:
-    """Which lines of a curve its coherence has, all but `LACKING` at an end, and which of the coherence these are; None where they are others."""
+    """Which lines of a curve its coherence has, all but `LACKING` at an end, and which of the
+    coherence these are; None where they are others."""
     own, there = curve.frequency, coherence.frequency
     if len(own) < 2 or len(coherence.value) != len(there) or len(there) < 2:
         return None

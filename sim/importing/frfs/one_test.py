@@ -182,7 +182,8 @@ def _beside(placed: Sequence[Placed], columns: list[np.ndarray], index: np.ndarr
 
 
 def _with_values(value: ComplexArray, placed: Sequence[Placed], notes: list[str]) -> slice:
-    """The lines between the first and the last at which every FRF has a value: analysers leave zeros below a high pass and above their span."""
+    """The lines between the first and the last at which every FRF has a value: analysers leave
+    zeros below a high pass and above their span."""
     first, last = 0, value.shape[1]
     for p, row in zip(placed, value, strict=True):
         there = np.flatnonzero(row)
@@ -208,7 +209,8 @@ def _check(frf: Frf, placed: Sequence[Placed], speed: float) -> None:
 
 
 def _meant(frf: Frf, placed: Sequence[Placed], speed: float) -> str:
-    """Whether the same numbers, taken for another quantity, are of a passive structure: then another unit is meant, unless the other sign would do as well."""
+    """Whether the same numbers, taken for another quantity, are of a passive structure: then
+    another unit is meant, unless the other sign would do as well."""
 
     def passes(value: np.ndarray) -> bool:
         try:

@@ -27,11 +27,11 @@ HEAVY = 0.2  # damping ratio from which a hump is no mode
 def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], list[str]]:
     """Modes of a test's magnitudes: each peak is fitted by |a / (1 - r^2 + 2 i z r) + b|, r = f / f0, in every FRF that shows it.
 
-    Frequency and damping are the medians over these FRFs, standard errors their scatter over the root of their number, 0.05 of a line at
-    least; of a peak in fewer than three FRFs those of the fit, and 0.05 half-power widths at least, and such a peak has a damping or is none.
-    What is one peak is told by half-power widths, not by lines, so that finer lines lose no mode. Shapes and close pairs are beyond magnitudes.
-    At a speed (rad/s) peaks at its multiples are no modes: the notes name them, and what is left out because few
-    FRFs show it, not clearly or near another mode.
+    Frequency and damping are the medians over these FRFs, standard errors their scatter over the root of their number,
+    0.05 of a line at least; of a peak in fewer than three FRFs those of the fit, and 0.05 half-power widths at least,
+    and such a peak has a damping or is none. What is one peak is told by half-power widths, not by lines, so that
+    finer lines lose no mode. Shapes and close pairs are beyond magnitudes. At a speed (rad/s) peaks at its multiples
+    are no modes: the notes name them, and what is left out because few FRFs show it, not clearly or near another mode.
     """
     found: list[tuple[ModeLine, float]] = []  # with how far each stands above its valleys, as a ratio
     step = float(np.median(np.diff(curves[0].frequency)))
@@ -108,8 +108,8 @@ def _width(mode: ModeLine) -> float:
 def _peak(frequency: Array, size: Array, top: int, drop: float, step: float) -> ModeLine | None:
     """The mode of a peak, from its flanks up to a half-power width on each side, or where that is a hump of several from twelve lines.
 
-    The half-power width w is that of the steeper flank, which a mode alone leaves at the share h of its height at w / 2 sqrt(1/h^2 - 1) off its peak;
-    h is that of the higher of the valleys beside it, if that is above a third.
+    The half-power width w is that of the steeper flank, which a mode alone leaves at the share h of its height at
+    w / 2 sqrt(1/h^2 - 1) off its peak; h is that of the higher of the valleys beside it, if that is above a third.
     """
     height = max(LOWEST, float(np.exp(-drop)))
     low = np.flatnonzero(size <= height * size[top])
@@ -121,8 +121,8 @@ def _peak(frequency: Array, size: Array, top: int, drop: float, step: float) -> 
 
 
 def _fitted(frequency: Array, size: Array, top: int, reach: int, step: float) -> ModeLine | None:
-    """One mode on a constant through the lines within `reach` of a peak that stand above a third of it, seven at least; None where that is no mode, or lies off the peak by half
-    its half-power width."""
+    """One mode on a constant through the lines within `reach` of a peak that stand above a third of
+    it, seven at least; None where that is no mode, or lies off the peak by half its half-power width."""
     near = np.arange(max(top - reach, 0), min(top + reach + 1, len(size)))
     lines = near[(size[near] > LOWEST * size[top]) | (np.abs(near - top) <= 3)]
     x, y = frequency[lines], size[lines] / size[top]

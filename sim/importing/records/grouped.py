@@ -16,8 +16,9 @@ Records = dict[tuple[str, End], list[tuple[Path, list[Motion]]]]
 
 
 def grouped(contents: Sequence[Content], settings: dict[Path, FileForm]) -> tuple[Records, list[Question]]:
-    """Time records by test and hammer point; force and responses of one hit may be in files of their own, of the same test, and those of several points in one
-    file that tells which point each response answers. Raises `BadInput` for records of one point that are not as many or not as long."""
+    """Time records by test and hammer point; force and responses of one hit may be in files of their
+    own, of the same test, and those of several points in one file that tells which point each
+    response answers. Raises `BadInput` for records of one point that are not as many or not as long."""
     groups: Records = {}
     questions: list[Question] = []
     apart: dict[str, list[Content]] = {}

@@ -1,7 +1,7 @@
 """Hits of a hammer: found in the records of its force, taken out of them without what their sensors held before, and judged.
 
-A hit cannot be used where a channel was overloaded (its extreme reached three times exactly, by it or by another hit of its record, or beyond what the mapping says) or where the hammer struck
-twice, and is none where the record ends before it does.
+A hit cannot be used where a channel was overloaded (its extreme reached three times exactly, by it or by another hit of its
+record, or beyond what the mapping says) or where the hammer struck twice, and is none where the record ends before it does.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ STEPS = 200  # of quantisation within an extreme, below which held samples tell 
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """One hit: the `force` (n,) of its pulse counted positive, and its `sense`, -1 where it was recorded negative; `response` (channels, n), `PRE_TRIGGER` before it, the response as `recorded`
-    too; `where` names it."""
+    """One hit: the `force` (n,) of its pulse counted positive, and its `sense`, -1 where it was recorded
+    negative; `response` (channels, n), `PRE_TRIGGER` before it, the response as `recorded` too; `where` names it."""
 
     where: str
     force: Array
@@ -86,9 +86,11 @@ def hits_of(path: Path, motions: Sequence[Motion], step: float, form: RecordForm
 
 
 def _still(response: Array, before: Array, lead: int, accelerations: Array) -> tuple[Array, Array]:
-    """Responses (channels, n) without what their sensors held before the blow, when nothing moves, and its share (channels,) of the largest value.
+    """Responses (channels, n) without what their sensors held before the blow, when nothing moves,
+    and its share (channels,) of the largest value.
 
-    `before` (channels, k) is that time, which ends `lead` samples into the responses. What was hit may go on at a constant speed or to another place, but no acceleration stays: of one, the straight
+    `before` (channels, k) is that time, which ends `lead` samples into the responses. What was hit
+    may go on at a constant speed or to another place, but no acceleration stays: of one, the straight
     line to its mean over the last tenth is taken out, which is the drift of a charge amplifier.
     """
     n, k = response.shape[-1], before.shape[-1]

@@ -1,6 +1,7 @@
 """FRFs of the hits of one hammer point, with coherence and standard errors by `sim.hammer.estimate`.
 
-H1, H2 and Hv (their geometric mean, with the phase of H1) are Bendat & Piersol, *Random Data* (2010), ch. 6; Rocklin, Crowley and Vold (IMAC 1985) for Hv.
+H1, H2 and Hv (their geometric mean, with the phase of H1) are Bendat & Piersol, *Random Data*
+(2010), ch. 6; Rocklin, Crowley and Vold (IMAC 1985) for Hv.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
 
 @dataclass(frozen=True, eq=False)
 class FromRecords:
-    """FRFs made of time records, the damping (1/s) of the window left in them, the time (s) from a record's start to the middle of its hit, the length (s) of each hit, and what was done
-    and asked."""
+    """FRFs made of time records, the damping (1/s) of the window left in them, the time (s) from a
+    record's start to the middle of its hit, the length (s) of each hit, and what was done and asked."""
 
     curves: tuple[Curve, ...]
     window_decay: float
@@ -40,8 +41,9 @@ class FromRecords:
 
 
 def of_records(groups: Records, form: RecordForm, measured: tuple[float, float] | None = None) -> dict[tuple[str, End], FromRecords]:
-    """The FRFs of every hammer point of every test (`frfs_of`). A test has one window: where one of its points needs it, all have it, whose damping is in all their FRFs then. And it has one length of hits, for its lines
-    to be the same: the shortest where others are little longer, as by the jitter of a trigger."""
+    """The FRFs of every hammer point of every test (`frfs_of`). A test has one window: where one of its
+    points needs it, all have it, whose damping is in all their FRFs then. And it has one length of hits, for
+    its lines to be the same: the shortest where others are little longer, as by the jitter of a trigger."""
     found = {(test, reference): frfs_of(files, reference, form, measured) for (test, reference), files in groups.items()}
     windowed = {test for (test, _), made in found.items() if made.window_decay > 0}
     shortest: dict[str, float] = {}
@@ -58,7 +60,8 @@ def of_records(groups: Records, form: RecordForm, measured: tuple[float, float] 
 
 
 def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm, measured: tuple[float, float] | None = None) -> FromRecords:
-    """The FRFs of all records that one hammer point made, each file with its force and responses; where `form` has no band, within the one that the scene is `measured` in (Hz).
+    """The FRFs of all records that one hammer point made, each file with its force and responses;
+    where `form` has no band, within the one that the scene is `measured` in (Hz).
 
     Raises `BadInput` for a sample that is no number.
     """
@@ -108,7 +111,8 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
 
 
 def _otherwise_large(per_hit: ComplexArray) -> list[float]:
-    """By what share the FRFs (hits, responses, 1, lines) of every hit are larger than those of the others, where that is the same on all channels at most lines, and more than these differ by; else 0."""
+    """By what share the FRFs (hits, responses, 1, lines) of every hit are larger than those of the
+    others, where that is the same on all channels at most lines, and more than these differ by; else 0."""
     size = np.abs(per_hit).reshape(len(per_hit), -1, per_hit.shape[-1])
     size = size[:, np.all(size > 0, axis=(0, 2))]  # NaN of a dead force, 0 of a dead response
     if len(size) < FEWEST_HITS or not size.size:

@@ -18,8 +18,9 @@ HEARD = 0.7  # coherence, from which a response is that of the hammer
 
 
 def end_needed(response: Array) -> float:
-    """End value of the exponential window for responses (references, hits, channels, n): one where every one has died away within its record, to `DECAYED` of its peak or to noise, which is spread
-    over all lines of its last twentieth while what still rings stands on a few; or to tones, as of what turns, which are as loud there as in the middle of the record."""
+    """End value of the exponential window for responses (references, hits, channels, n): one where every one has died away
+    within its record, to `DECAYED` of its peak or to noise, which is spread over all lines of its last twentieth while what
+    still rings stands on a few; or to tones, as of what turns, which are as loud there as in the middle of the record."""
     n = response.shape[-1]
     m = -(-n // 20)
     tail, middle = response[..., -m:], response[..., n // 2 - m : n // 2]
@@ -34,7 +35,8 @@ def end_needed(response: Array) -> float:
 
 
 def _power(part: Array) -> Array:
-    """Of the lines (references, channels, m) of a part of a record, over all its hits; tapered, so that a tone between lines stands on three."""
+    """Of the lines (references, channels, m) of a part of a record, over all its hits; tapered, so
+    that a tone between lines stands on three."""
     m = part.shape[-1]
     return np.asarray((np.abs(np.fft.rfft((part - part.mean(axis=-1, keepdims=True)) * np.hanning(m + 2)[1:-1], axis=-1)[..., 1:]) ** 2).sum(axis=1))
 
@@ -49,15 +51,18 @@ def excited(force: Array, step: float) -> tuple[float, float]:
 
 
 def shared(band: tuple[float, float], measured: tuple[float, float] | None) -> tuple[float, float]:
-    """What the hammer excites of the band that the scene is measured in: what lies beyond has modes of its own, which the scene does not speak of; all of it where they share none."""
+    """What the hammer excites of the band that the scene is measured in: what lies beyond has modes
+    of its own, which the scene does not speak of; all of it where they share none."""
     low, high = max(band[0], measured[0]) if measured else band[0], min(band[1], measured[1]) if measured else band[1]
     return (low, high) if low < high else band
 
 
 def first_heard(frf: Frf, hits: int) -> int:
-    """The first line from which some response is coherent with the force, over a hundredth of the lines: what an accelerometer says of slow motion is noise and drift alone.
+    """The first line from which some response is coherent with the force, over a hundredth of the
+    lines: what an accelerometer says of slow motion is noise and drift alone.
 
-    Noise has a coherence of 1 / hits in the mean, and exceeds 1 - p^(1 / (hits - 1)) with probability p (Carter, *Proc. IEEE* 75 (1987) 236).
+    Noise has a coherence of 1 / hits in the mean, and exceeds 1 - p^(1 / (hits - 1)) with
+    probability p (Carter, *Proc. IEEE* 75 (1987) 236).
     """
     if frf.coherence is None:
         return 0

@@ -41,7 +41,8 @@ def test_probabilities_are_bayes():
 
 
 def test_of_many_ways_in_which_an_effect_may_act_one_was_fitted():
-    """On eight channels alike: one is an eighth as likely beforehand, and so is the effect as much less probable as it had more to choose from."""
+    """On eight channels alike: one is an eighth as likely beforehand, and so is the effect as much
+    less probable as it had more to choose from."""
     found = made({"a": 30.0, "b": 30.0})
     chosen = [replace(mechanism("a"), choices={"channel": float(k)}) for k in range(8)]
     shown = [Screened(m, 0.0, np.zeros(2), visibility) for m, visibility in [*((m, 1.0) for m in chosen), (replace(chosen[0], choices={"channel": 9.0}), 0.0)]]
@@ -51,7 +52,8 @@ def test_of_many_ways_in_which_an_effect_may_act_one_was_fitted():
 
 
 def test_each_way_to_act_has_its_share_of_an_explanation():
-    """At the lower bearing or the upper one, 2 in ln evidence apart: one explanation, as probable as both together, and its ways as likely as their evidence says."""
+    """At the lower bearing or the upper one, 2 in ln evidence apart: one explanation, as probable
+    as both together, and its ways as likely as their evidence says."""
     found = made({"a": 30.0, "b": 30.0})
     own = [replace(mechanism("a"), choices={"bearing": float(k)}) for k in range(2)]
     h = next(h for h in found.hypotheses if h.names == ("a",))
@@ -70,7 +72,8 @@ WRONG = [({}, 1.0, 1.0), ({STIFFNESS: 1e-3, DAMPING: 0.01}, 1.0, 1.0), ({BUILD: 
 
 @pytest.mark.parametrize(("sizes", "errors", "worth"), WRONG)
 def test_evidence_is_worth_less_where_the_model_is_seen_to_be_wrong(sizes, errors, worth):
-    """A lead of six is a lead of six where constant errors of modes are all that is wrong, and of a quarter of it where errors or tolerances are too small."""
+    """A lead of six is a lead of six where constant errors of modes are all that is wrong, and of a
+    quarter of it where errors or tolerances are too small."""
     found = made({"a": 30.0, "b": 24.0})
     wrong = [replace(h, evidence=replace(h.evidence, learned=replace(h.evidence.learned, sizes=sizes, errors=errors))) for h in found.hypotheses]
     v = decide(replace(found, hypotheses=tuple(wrong), base=wrong[-1]))
@@ -82,7 +85,8 @@ def test_evidence_is_worth_less_where_the_model_is_seen_to_be_wrong(sizes, error
 
 
 def test_noise_that_a_window_spreads_over_lines_counts_as_often_as_it_says_something():
-    """A second effect of 23 in ln evidence, of a third fewer numbers for a window's noise: blind campaign 2000 named one of two, for that counted a quarter on top of it."""
+    """A second effect of 23 in ln evidence, of a third fewer numbers for a window's noise: blind
+    campaign 2000 named one of two, for that counted a quarter on top of it."""
     best = made({"a": 30.0}).hypotheses[0]
     assert discount(best, Overlap(1.5, 0.0, 1.5)) == 1.5 * TOO_SURE
     assert discount(best, Overlap(1.5, 0.1, 1.9)) == 1.9 * COARSE * TOO_SURE
@@ -101,15 +105,16 @@ def test_what_is_missed_in_every_test_is_one_finding(share):
 
 
 def test_noise_of_few_numbers_says_nothing_twice():
-    """One FRF of 140 lines in four tests: correlations of a twentieth are chance there, and evidence is worth what it says. A spindle's weaker preload, seen from its nose alone, was no
-    effect for that: its 8.0 in ln evidence counted 2."""
+    """One FRF of 140 lines in four tests: correlations of a twentieth are chance there, and evidence is worth what it
+    says. A spindle's weaker preload, seen from its nose alone, was no effect for that: its 8.0 in ln evidence counted 2."""
     random = np.random.default_rng(11)
     found = [between_tests([(np.arange(140.0), random.standard_normal((2, 140))) for _ in range(4)]) for _ in range(100)]
     assert np.mean(np.array(found) > 0) < 0.05  # six pairs, of which each is beyond three standard deviations once in 700
 
 
 def test_noise_that_a_window_spreads_says_nothing_twice_between_tests():
-    """Autoregressive over lines, 0.7 from one to the next: of 800 numbers a sixth are of their own, and of 36 pairs of tests some correlate by chance."""
+    """Autoregressive over lines, 0.7 from one to the next: of 800 numbers a sixth are of their own,
+    and of 36 pairs of tests some correlate by chance."""
     random = np.random.default_rng(3)
 
     def noise() -> tuple[np.ndarray, np.ndarray]:
@@ -131,7 +136,9 @@ def test_a_little_more_beside_a_law_that_does_not_hold_is_no_second_effect(gaine
 
 @pytest.mark.parametrize(("lasts", "choices", "word"), [(True, {}, "two effects"), (False, {}, "ambiguous"), (False, {"thermal_share": 0.0}, "ambiguous")])
 def test_what_lasts_is_not_what_is_wrong_in_a_law(lasts, choices, word):
-    """Not what was chosen to last: in 2435 a loss of preload, as much as no law has it, was named for a compliance of one bearing, 22 in ln evidence behind that. Blind campaign 2292: a compliance of the bearings whose law does not hold, and beside it a mass on the hub, the same in every test, by 9 in ln evidence of which a quarter counted."""
+    """Not what was chosen to last: in 2435 a loss of preload, as much as no law has it, was named for a compliance of
+    one bearing, 22 in ln evidence behind that. Blind campaign 2292: a compliance of the bearings whose law does not
+    hold, and beside it a mass on the hub, the same in every test, by 9 in ln evidence of which a quarter counted."""
     found = made({("first", "more"): 614.0, "first": 600.0, "more": 20.0})
 
     def made_so(h: Hypothesis) -> Hypothesis:
@@ -146,9 +153,10 @@ def test_what_lasts_is_not_what_is_wrong_in_a_law(lasts, choices, word):
 @pytest.mark.usefixtures("exact_actions")
 @pytest.mark.parametrize(("a", "b", "behind", "doubt"), [(0.0, 0.0, 9.0, 0.0), (15.0, 0.0, 9.0, 15.0), (15.0, 15.0, 9.0, 0.0), (900.0, 15.0, 9.0, 285.0), (15.0, 0.0, 1.0, 0.0)])
 def test_what_a_law_leaves_in_doubt_is_no_more_than_it_gained(a, b, behind, doubt):
-    """Two effects that explain as much with the same second one: by departures of `a` and a law of `b`'s own, which lose in ln evidence as much of what the
-    second gains as they gained, and all of its 300 at most; nothing where the other does as well alone, by its own law, and has the second beside it: then that is
-    no matter of laws. Campaign 851 of the blind study was answered another effect than the preload for that."""
+    """Two effects that explain as much with the same second one: by departures of `a` and a law of `b`'s own,
+    which lose in ln evidence as much of what the second gains as they gained, and all of its 300 at most;
+    nothing where the other does as well alone, by its own law, and has the second beside it: then that is no
+    matter of laws. Campaign 851 of the blind study was answered another effect than the preload for that."""
     found = made({("a", "c"): 400.0 + behind, ("b'", "c"): 400.0, "a": 100.0 + behind, "b'": 100.0, "b": 100.0 - b})
     hypotheses = tuple(by_departing(h, a) if h.names == ("a",) else h for h in found.hypotheses)
     first, second = (next(c.probability for c in decide(replace(found, hypotheses=hypotheses)).candidates if c.names == (k, "c")) for k in "ab")
@@ -157,8 +165,8 @@ def test_what_a_law_leaves_in_doubt_is_no_more_than_it_gained(a, b, behind, doub
 
 @pytest.mark.parametrize(("more", "word"), [(12.0, "identified"), (17.0, "ambiguous"), (400.0, "two effects")])
 def test_a_little_more_beside_an_effect_of_much_is_what_that_does_otherwise(more, word):
-    """A stranger's grinding spindle, whose bond softens a little otherwise than modelled: 7018 in ln evidence, and `ring_growth` beside it, by 25 of size nothing, was named at 97 %. Up to a hundredth of what the first gains
-    the second counts a quarter."""
+    """A stranger's grinding spindle, whose bond softens a little otherwise than modelled: 7018 in ln evidence, and `ring_growth`
+    beside it, by 25 of size nothing, was named at 97 %. Up to a hundredth of what the first gains the second counts a quarter."""
     v = decide(made({("first", "more"): 4679.0 + more, "first": 4679.0, "more": 20.0}))  # over what evidence is divided by
     assert (v.word, v.effects[0]) == (word, "first")
     counted = more - (1 - 1 / COARSE) * min(more, ACTS_OTHERWISE * 4679.0)
@@ -170,8 +178,9 @@ def test_a_little_more_beside_an_effect_of_much_is_what_that_does_otherwise(more
 @pytest.mark.usefixtures("exact_actions")
 @pytest.mark.parametrize(("departs", "gain"), [(1.0, 70.0 / COARSE), (0.1, 70.0)])
 def test_what_gains_beside_something_free_that_follows_no_law_is_in_doubt(departs, gain):
-    """Blind campaign 2150, a compliance beside a warm standing part: `cooling_imbalance` with free rings beside it, 70 in ln evidence over these alone, was the answer, above 0.98; of the true two, 37 in ln evidence
-    before it, what the second gained over the first had counted a quarter, and of these all."""
+    """Blind campaign 2150, a compliance beside a warm standing part: `cooling_imbalance` with free rings
+    beside it, 70 in ln evidence over these alone, was the answer, above 0.98; of the true two, 37 in ln
+    evidence before it, what the second gained over the first had counted a quarter, and of these all."""
     found = made({("a", "~x"): 480.0, "~x": 410.0, ("b", "c"): 470.0, "b": 10.0, "c": 10.0})
 
     def departing(h: Hypothesis) -> Hypothesis:
@@ -220,7 +229,8 @@ def test_a_size_that_cannot_be_is_no_law_of_its_own():
 
 @pytest.mark.parametrize(("sizes", "word"), [((-3.0, -4.0), "none"), ((-3.0, 4.0), "identified"), ((-0.1, -0.1), "identified"), ((3.0, 4.0), "identified")])
 def test_what_would_have_to_be_of_the_opposite_sign_everywhere_is_not_there(sizes, word):
-    """A compliance that would be negative in every test, by thirty standard errors, gains by what is wrong with the model; not so one that departs in one test. Errors are those with shapes as they are:
+    """A compliance that would be negative in every test, by thirty standard errors, gains by what is
+    wrong with the model; not so one that departs in one test. Errors are those with shapes as they are:
     of an amount times what a shape makes of it a quadratic says that it may be nothing, where it cannot."""
     found = made({"a": 40.0})
     size = replace(SIZE, limits=(0.0, 9.0))
@@ -243,8 +253,9 @@ def test_what_would_have_to_be_of_the_opposite_sign_everywhere_is_not_there(size
     ],
 )  # fmt: skip
 def test_a_free_form_that_changes_the_same_as_an_effect_is_that_effect(named, leaves, shape, alike, word):
-    """Where the effect does as well in ln evidence, or leaves no more of the data (`leaves` in ln of their probability) at shapes that are likely, and is behind by what these cost, with whatever law; beside the same
-    second too. Of blind campaigns 892, 897 and 937 the right names were 4 to 6 behind what they change, and unexplained; of 2345, where a plate tilts like it bends, 12.6."""
+    """Where the effect does as well in ln evidence, or leaves no more of the data (`leaves` in ln of their probability) at shapes
+    that are likely, and is behind by what these cost, with whatever law; beside the same second too. Of blind campaigns 892, 897
+    and 937 the right names were 4 to 6 behind what they change, and unexplained; of 2345, where a plate tilts like it bends, 12.6."""
 
     def left(h: Hypothesis) -> Hypothesis:
         if h.free or not h.mechanisms:
@@ -275,7 +286,8 @@ def test_an_effect_has_the_evidence_of_what_it_changes():
 
 @pytest.mark.parametrize(("alike", "word"), [({"a", "b"}, "ambiguous"), ({"a"}, "identified"), (set(), "identified")])
 def test_between_effects_that_change_the_same_the_law_alone_tells_and_is_not_sure(alike, word):
-    """Blind campaign 821: balls that shrank by a law of their own were told as `soak_lag`, 4.4 in ln evidence before three others that move rings apart: 98.9 % probable."""
+    """Blind campaign 821: balls that shrank by a law of their own were told as `soak_lag`, 4.4 in
+    ln evidence before three others that move rings apart: 98.9 % probable."""
     v = decide(replace(made({"a": 423.2, "b": 418.8, "~x": 415.6}), alike={"~x": frozenset(alike)}))
     assert v.word == word
     assert total(v) == pytest.approx(1.0)
@@ -298,7 +310,8 @@ def test_odds_of_a_law_of_its_own():
 
 
 def test_what_cannot_be_does_not_say_what_is_left():
-    """An effect of a size that it cannot have clears a misfit that changes from test to test; the best that can be leaves most of it, also where it does as well."""
+    """An effect of a size that it cannot have clears a misfit that changes from test to test; the
+    best that can be leaves most of it, also where it does as well."""
     found = made({"b": 60.0, "a'": 66.0})
 
     def left(h: Hypothesis) -> Hypothesis:
@@ -315,8 +328,8 @@ def test_what_cannot_be_does_not_say_what_is_left():
 
 @pytest.mark.parametrize(("best", "word"), [(40.0, "unexplained"), (60.0, "identified"), (5.0, "none")])
 def test_what_does_what_an_effect_cannot_is_something_unknown(best, word):
-    """Blind campaign 811: the turning part was warmer, where `thermal_gradient` has the other one so. It gained 133 and was left out; `ring_growth` was named for 89. Not
-    where what can be does nearly as well, or no more than nothing."""
+    """Blind campaign 811: the turning part was warmer, where `thermal_gradient` has the other one so. It gained 133 and
+    was left out; `ring_growth` was named for 89. Not where what can be does nearly as well, or no more than nothing."""
     found = made({"b": best, "a": 66.0})
     sizes = np.array([[-3.0, -4.0]])
 
@@ -350,7 +363,8 @@ def test_an_effect_and_what_does_what_it_cannot_are_two():
 
 @pytest.mark.parametrize(("departures", "word"), [((1.0, 1.0), "ambiguous"), ((0.0, 1.0), "two effects")])
 def test_two_effects_of_which_neither_has_its_law_are_not_sure(departures, word):
-    """Another's campaign with a warm shaft and a softening plate: `plate_prestress` + `thermometer_error`, whose sizes went where they liked, were 7 in ln evidence before the truth."""
+    """Another's campaign with a warm shaft and a softening plate: `plate_prestress` +
+    `thermometer_error`, whose sizes went where they liked, were 7 in ln evidence before the truth."""
     found = made({("a", "b"): 107.0, ("a", "c"): 100.0, "a": 20.0})
 
     def departing(h: Hypothesis) -> Hypothesis:

@@ -59,8 +59,8 @@ def test_words(case):
 
 
 def test_a_name_beside_which_something_drifts_is_as_probable_as_it_is_told():
-    """Most of what is gained is the name's own: what it and a little drift have together is told as its probability, and errors are told with both. Where drift
-    is most of it, that is something unknown."""
+    """Most of what is gained is the name's own: what it and a little drift have together is told as its
+    probability, and errors are told with both. Where drift is most of it, that is something unknown."""
     little, mostly = (decide(made(CASES[case][0])) for case in ("a little drift beside one", "mostly drift, with a name beside"))
     assert little.candidates[0].names == ("a",)
     assert little.candidates[0].probability > 0.95
@@ -93,7 +93,8 @@ def test_a_wrong_name_costs_ten_times_a_set():
 
 
 def test_an_effect_that_leads_is_not_something_else():
-    """A name that is 83 % probable beside 17 % of something unknown: wrong in one case of six, at ten, against an answer that is wrong in five of six."""
+    """A name that is 83 % probable beside 17 % of something unknown: wrong in one case of six, at
+    ten, against an answer that is wrong in five of six."""
     v = decide(made({"a": 40.1, "~x": 40.0}))
     assert 0.8 < v.candidates[0].probability < 0.9
     assert v.losses["unexplained"] == pytest.approx(6 * v.candidates[0].probability)
@@ -117,8 +118,8 @@ def test_a_set_has_what_its_names_have_with_a_little_drift_beside_them():
 
 
 def test_an_answer_costs_by_the_part_that_it_leaves_unsaid():
-    """Two names that do as well, each with a little drift beside it and hardly without: to say that something unknown drifts leaves the larger part unsaid, a set of
-    the names the smaller."""
+    """Two names that do as well, each with a little drift beside it and hardly without: to say that
+    something unknown drifts leaves the larger part unsaid, a set of the names the smaller."""
     v = decide(made({"a": 90.0, "b": 90.0, "~x": 20.0, ("a", "~x"): 110.0, ("b", "~x"): 110.0}))
     assert (v.word, set(v.effects)) == ("ambiguous", {"a", "b"})
     assert v.losses["unexplained"] == pytest.approx(HALF, rel=1e-3)
@@ -129,7 +130,8 @@ def test_an_answer_costs_by_the_part_that_it_leaves_unsaid():
 
 
 def test_a_set_holds_only_what_is_probable():
-    """One effect alone, with another, or with something that drifts: the set is those two, not what the rest of the catalogue reaches far behind."""
+    """One effect alone, with another, or with something that drifts: the set is those two, not what
+    the rest of the catalogue reaches far behind."""
     v = decide(made({("left", "right"): 58.0, "left": 53.5, ("left", "~drift"): 56.0, "behind": 5.0, "far": -40.0}))
     assert 0.5 < max(c.probability for c in v.candidates) < 0.95
     assert (v.word, set(v.effects)) == ("ambiguous", {"left", "right"})
@@ -178,7 +180,8 @@ def test_what_is_as_much_in_every_test_does_not_drift(sizes, said):
 
 @pytest.mark.parametrize(("chi2", "word"), [(30.0, "unexplained"), (3.0, "none")])
 def test_data_that_are_missed_grossly_are_not_nothing_missing(chi2, word):
-    """More than five times the errors, and nothing tried gains anything: no probability is left for *none*, and the sentence says where to look."""
+    """More than five times the errors, and nothing tried gains anything: no probability is left for
+    *none*, and the sentence says where to look."""
     found = made({"a": -3.0, "~x": -4.0})
     none = found.base
     grossly = replace(none, evidence=replace(none.evidence, chi2=chi2 * none.fit.count))
@@ -190,7 +193,8 @@ def test_data_that_are_missed_grossly_are_not_nothing_missing(chi2, word):
 
 @pytest.mark.parametrize(("mass", "word"), [(-45.0, "unexplained"), (-10.0, "none")])
 def test_what_nothing_is_built_as_is_not_nothing_missing(mass, word, monkeypatch):
-    """A rotor that turned the other way was *none*: its tolerances had gone to a tenth of the mass and the stiffness of the shaft, with chi2 of 1.01 a number and 39 standard errors left out."""
+    """A rotor that turned the other way was *none*: its tolerances had gone to a tenth of the mass
+    and the stiffness of the shaft, with chi2 of 1.01 a number and 39 standard errors left out."""
     found = made({"a": -3.0, "~x": -4.0})
     model = SimpleNamespace(parameters=(Nuisance(BUILD, "spindle mass", 0.02), Nuisance(BUILD, "preload", 0.05)))
     off = reason.unbuilt(model, SimpleNamespace(evidence=SimpleNamespace(mean=np.array([mass, 1.0]))))
@@ -222,7 +226,8 @@ def test_what_changes_beyond_noise_is_not_nothing_missing(leaves, tests, word):
 
 
 def test_a_drawing_that_is_off_is_said():
-    """With the tolerances that are off by more than twice what is stated, the largest first; nothing is told as less than a tenth of itself, as nothing is built so."""
+    """With the tolerances that are off by more than twice what is stated, the largest first;
+    nothing is told as less than a tenth of itself, as nothing is built so."""
     found = made({"a": 60.0})
     parameters = tuple(Nuisance(BUILD, name, 0.02) for name in ("mass", "preload", "mount", "hub"))
     lead = found.hypotheses[0]
@@ -281,7 +286,8 @@ def test_what_conditions_left_out_do_not_confirm_is_said(misses, confirmed):
 
 
 def test_errors_are_told_of_all_that_is_named():
-    """Of two effects that are named for what they reach beside something that drifts, and not of the one which alone reaches nearly as much."""
+    """Of two effects that are named for what they reach beside something that drifts, and not of
+    the one which alone reaches nearly as much."""
     v = decide(made({"a": 40.0, ("a", "b"): 41.0, ("a", "b", "~x"): 62.0}))
     assert (v.word, set(v.effects)) == ("two effects", {"a", "b"})
     assert set(v.accepted.names) >= {"a", "b"}

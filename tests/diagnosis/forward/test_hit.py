@@ -1,4 +1,5 @@
-"""Where records that end early were hit: found from the data of a damped spindle whose answers these cut off, and not sought where they need not be."""
+"""Where records that end early were hit: found from the data of a damped spindle whose answers
+these cut off, and not sought where they need not be."""
 
 from __future__ import annotations
 
@@ -22,8 +23,8 @@ LEAST = 24.0
 
 
 def hit(spindle, *before, told=(), times=1.0):
-    """Tests whose records begin so many seconds before the hit, None for records without end, alike or each by its own, and do not tell but for those `told`; what that
-    leaves out is there so many `times`."""
+    """Tests whose records begin so many seconds before the hit, None for records without end, alike or
+    each by its own, and do not tell but for those `told`; what that leaves out is there so many `times`."""
     before = before * (2 // len(before))
     errors = drawn(spindle, 2, 4)
     whole = virtual_campaign(spindle, CONDITIONS, 4, errors=errors, noise=WITHOUT, frequency=FREQUENCY)
@@ -58,8 +59,8 @@ def test_it_is_not_sought_without_need(spindle, before):
 
 @pytest.mark.parametrize("times", [1.0, 4.0])
 def test_what_gains_more_than_is_left_out_is_something_else(spindle, times):
-    """Another's FRFs were computed, without any records: every one of eight campaigns was said to end early, with hits 0.2 to 46 ms after the start. What is left out was of 2 standard
-    errors a test, and gained 20 to 40 in squares of them."""
+    """Another's FRFs were computed, without any records: every one of eight campaigns was said to end early, with hits 0.2
+    to 46 ms after the start. What is left out was of 2 standard errors a test, and gained 20 to 40 in squares of them."""
     model = hit(spindle, 0.6e-3, times=times)
     x = truth(model, drawn(spindle, 2, 4))
     assert (hit_found(model, x, LEAST) is None) == (times > 1)

@@ -28,7 +28,8 @@ from thermospindle.sim.operating import operating_point
 
 @pytest.mark.parametrize(("quantity", "decay"), [("mobility", 0.0), ("accelerance", 15.0), ("receptance", 15.0)])
 def test_derivatives_of_lines(scene, quantity, decay):
-    """Every nuisance parameter, at speed and warm: build, rings and temperature to the error of one-sided steps of matrices, the rest exactly."""
+    """Every nuisance parameter, at speed and warm: build, rings and temperature to the error of
+    one-sided steps of matrices, the rest exactly."""
     model, x = made(scene, quantity=quantity, window_decay=decay)
     worst = worst_by_kind(model, 1, x)
     assert set(worst) == set(KINDS) - {kinds_of.FLUNG, kinds_of.ORBITS}  # these scenes' balls have none
@@ -51,7 +52,8 @@ def test_derivatives_of_lines_beside_loss_factors(scene):
 
 
 def test_what_modes_lose_otherwise_is_at_their_own_frequency_what_it_is(scene):
-    """Where loss factors alone lose, whatever their law: at other frequencies a complex stiffness loses as much, and a damper in proportion."""
+    """Where loss factors alone lose, whatever their law: at other frequencies a complex stiffness
+    loses as much, and a damper in proportion."""
     joints = tuple(replace(j, damping_ratio=0.0, loss_factor=0.04) for j in scene.structure.joints)
     bearings = tuple(replace(b, damping_ratio=0.0) for b in scene.bearings)
     model, x = made(replace(scene, structure=replace(scene.structure, joints=joints), bearings=bearings))
@@ -85,7 +87,8 @@ def test_what_dampers_lose_otherwise_costs_no_product_more(scene):
 
 
 def test_what_modes_lose_otherwise_than_drawn_has_the_law_of_the_dampers(scene):
-    """With a complex stiffness all of it has one. Taken for dampers' it left a spindle with nothing hidden 3400 in ln evidence behind, and two effects were named (blind campaign 3201)."""
+    """With a complex stiffness all of it has one. Taken for dampers' it left a spindle with nothing
+    hidden 3400 in ln evidence behind, and two effects were named (blind campaign 3201)."""
     model, x = made(scene)
     x[:] = 0.0
     for value in (0.0, 1.0):
@@ -106,7 +109,8 @@ def test_what_modes_lose_otherwise_than_drawn_has_the_law_of_the_dampers(scene):
 
 @pytest.mark.parametrize("lossy", [False, True], ids=["dampers", "loss-factors"])
 def test_a_loss_that_is_the_same_at_all_frequencies_is_a_complex_stiffness(scene, lossy):
-    """Every line of K + i H - w^2 M + i w G against it, with dampers beside loss factors as they are: what a program in the frequency domain has."""
+    """Every line of K + i H - w^2 M + i w G against it, with dampers beside loss factors as they
+    are: what a program in the frequency domain has."""
     if lossy:
         joints = tuple(replace(j, damping_ratio=0.0, loss_factor=0.04) for j in scene.structure.joints)
         scene = replace(scene, structure=replace(scene.structure, joints=joints))
@@ -152,7 +156,8 @@ def test_derivatives_of_lines_whose_errors_go_together(scene):
 
 
 def test_what_a_bearing_may_change_by_otherwise():
-    """With temperature in all tests alike, a third of that in each by itself, and there a share of what speed does; nothing where nothing changes."""
+    """With temperature in all tests alike, a third of that in each by itself, and there a share of
+    what speed does; nothing where nothing changes."""
     rows, still = ["upper", "lower"], np.zeros(2)
     found = kinds_of.changes_of(["cold", "warm", "fast"], [0.0, 1.0, 0.5], rows, [still, still, np.array([-0.15, -0.05])])
     assert [p.test for p in found] == [None, 1, 1, 2, 2, 2, 2, 2, 2]
@@ -174,7 +179,8 @@ def test_a_row_that_speed_changes_otherwise_is_alone_in_it(scene):
 
 @pytest.mark.parametrize("rows", [None, 0])
 def test_a_test_that_is_left_out_has_no_derivatives(scene, rows):
-    """Neither lines nor, of a table of modes, responses: what `spindle ladder` holds out. Every ladder over two temperatures once ended here."""
+    """Neither lines nor, of a table of modes, responses: what `spindle ladder` holds out. Every
+    ladder over two temperatures once ended here."""
     model, x = made(scene)
     left = unseen(model, LeftOut((1,)))
     if rows == 0:
@@ -196,7 +202,8 @@ def has_none(model, x):
 
 @pytest.mark.slow
 def test_derivatives_of_a_flexible_shaft():
-    """Of its reduced model, at speed and warm, against differences of residuals that have a basis of their own on either side: what moves the basis is off by half a per cent."""
+    """Of its reduced model, at speed and warm, against differences of residuals that have a basis
+    of their own on either side: what moves the basis is off by half a per cent."""
     model, x = made(load(ROOT / "scenes" / "five_bearing"), frequency=np.arange(300.0, 4000.1, 50.0))
     worst = worst_by_kind(model, 1, x)
     for kind in (kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.RECORD, kinds_of.LAW):
@@ -219,7 +226,8 @@ def test_parameters_of_other_tests_do_not_move_a_test(scene):
 
 @pytest.mark.parametrize("rows", [(3, 1, 2), (2, 3)])
 def test_gains_and_delays_go_with_sensors_and_not_with_rows(rows):
-    """Sensors in another order in the second test, or one of them missing: at what was put in nothing is left, and derivatives are those of the residual."""
+    """Sensors in another order in the second test, or one of them missing: at what was put in
+    nothing is left, and derivatives are those of the residual."""
     scene, each, frequency = load(SCENES["symmetric"]), {1: 0.03, 2: -0.02, 3: 0.05}, np.arange(400.0, 3000.1, 200.0)
     late = {1: 1e-7, 2: 3e-7, 3: -2e-7}  # s
     tests = []
@@ -242,7 +250,8 @@ def test_gains_and_delays_go_with_sensors_and_not_with_rows(rows):
 
 @pytest.mark.parametrize("columns", [(3, 1), (3,), (1, 3)])
 def test_gains_of_hammers_go_with_their_points(columns):
-    """Hammers in another order in the second test, or one of them missing: at what was put in nothing is left, and derivatives are those of the residual."""
+    """Hammers in another order in the second test, or one of them missing: at what was put in
+    nothing is left, and derivatives are those of the residual."""
     scene, each, frequency = load(SCENES["symmetric"]), {1: 0.01, 3: -0.006}, np.arange(400.0, 3000.1, 200.0)
     tests = []
     for t, own in enumerate(((1, 3), columns)):
@@ -295,7 +304,8 @@ def test_column_of_an_effect_on_matrices(scene):
 
 
 def test_modes_beyond_the_band_may_be_wrong_too(scene):
-    """By their stiffness, which lends the band a spring: as the lines of a dense model have it whose stiffness is off along one of them. Not by their damping."""
+    """By their stiffness, which lends the band a spring: as the lines of a dense model have it
+    whose stiffness is off along one of them. Not by their damping."""
     model, _ = made(scene, frequency=np.arange(400.0, 2400.1, 20.0), noise=NOISELESS)
     seen, modes = model.reference.seen, len(model.reference.omega)
     assert 0 < seen < modes
@@ -325,7 +335,8 @@ def test_the_truth_leaves_noise(scene):
 
 
 def test_what_conditions_do_to_modes_is_what_their_frequencies_do(scene):
-    """Of the drawing, to first order, against the poles where they are told apart: nothing at the reference, and 1.5 K above it to a twentieth of the most that a mode moves."""
+    """Of the drawing, to first order, against the poles where they are told apart: nothing at the
+    reference, and 1.5 K above it to a twentieth of the most that a mode moves."""
     campaign = mode_campaign(scene, (Condition(20.0), Condition(21.5)), 3)
     model = model_of(scene, campaign)
     found = model.by_condition

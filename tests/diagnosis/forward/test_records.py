@@ -18,7 +18,8 @@ from thermospindle.model.rotor.poles import poles
 
 @pytest.mark.parametrize("before", [0.0, 0.004])
 def test_records_that_end_early(scene, before):
-    """A record of T seconds and its discrete Fourier transform, mode by mode: p A e^(p t) from the hit, some time `before` which it began, to its end under the window."""
+    """A record of T seconds and its discrete Fourier transform, mode by mode: p A e^(p t) from the
+    hit, some time `before` which it began, to its end under the window."""
     decay = 15.0
     model, x = made(scene, window_decay=decay)
     x[[p.kind == RECORD for p in model.parameters]] = 1.0
@@ -39,8 +40,8 @@ def test_records_that_end_early(scene, before):
 
 
 def test_derivatives_of_records_that_end_early(scene):
-    """By an element's mass, damping and stiffness, against central differences; without what they do to the end of the records they are wrong by parts
-    in a hundred."""
+    """By an element's mass, damping and stiffness, against central differences; without what they
+    do to the end of the records they are wrong by parts in a hundred."""
     model, x = made(scene, window_decay=15.0)
     data, linear = replace(model.tests[0], test=replace(model.tests[0].test, pretrigger=0.004)), model.linear(0, x, [])
     m, gain, n = linear.matrices, np.ones(len(linear.chain.gain)), len(linear.matrices.mass)

@@ -39,7 +39,8 @@ def meshes():
 
 @pytest.mark.parametrize("name", ["mk7702", "five_bearing"])
 def test_no_plane_of_a_shaft_is_left_out_of_the_basis_alone(name):
-    """Sixteen modes had one of two that coincide as the last: campaign 1012 of the blind study, with nothing hidden, was then wrong by 6600 in ln evidence."""
+    """Sixteen modes had one of two that coincide as the last: campaign 1012 of the blind study,
+    with nothing hidden, was then wrong by 6600 in ln evidence."""
     spindle = load(ROOT / "scenes" / name)
     linear = matrices(operating_point(spindle, Condition(spindle.reference_temperature)).chain)
     highest = 2 * np.pi * spindle.hammer.band[1]
@@ -51,8 +52,8 @@ def test_no_plane_of_a_shaft_is_left_out_of_the_basis_alone(name):
 
 
 def test_a_coarse_mesh_answers_as_a_fine_one_does():
-    """FRFs of a machine-tool spindle, warm and turning: beside those of elements a quarter as long the diagnosis's model is off by a sixth at most of what the same mesh is
-    off by whose masses are at its nodes, and what is left is the finer one's own."""
+    """FRFs of a machine-tool spindle, warm and turning: beside those of elements a quarter as long the diagnosis's model is off
+    by a sixth at most of what the same mesh is off by whose masses are at its nodes, and what is left is the finer one's own."""
     coarse, fine = meshes()
     condition, frequency = Condition(40.0, 8000 * RPM), np.arange(300.0, 3000.0, 40.0)
     of_a_machine = replace(virtual_campaign(coarse, (condition,), 1, noise=NOISELESS, frequency=frequency), lumped_shafts=False)
@@ -69,8 +70,8 @@ def test_a_coarse_mesh_answers_as_a_fine_one_does():
 
 
 def test_a_table_of_modes_has_the_mass_of_shafts_where_it_is():
-    """Frequencies of a spindle with a fine mesh, turning, to 1e-4: the coarse one has them to a third of that, by its reduced model, as the whole one by itself; lumps, where the test
-    is told to be of such, miss the last two, at 4.1 kHz, by more than ten times that."""
+    """Frequencies of a spindle with a fine mesh, turning, to 1e-4: the coarse one has them to a third of that, by its reduced model, as
+    the whole one by itself; lumps, where the test is told to be of such, miss the last two, at 4.1 kHz, by more than ten times that."""
     coarse, fine = meshes()
     point = operating_point(fine, Condition(coarse.reference_temperature, 8000 * RPM))
     linear, between = point.linear, mass_between(point, fine)
@@ -93,7 +94,8 @@ def test_a_table_of_modes_has_the_mass_of_shafts_where_it_is():
 
 @pytest.mark.parametrize(("name", "rpm"), [("free_shaft", 0.0), ("mk7702", 0.0), ("five_bearing", 8000.0)])
 def test_frfs_and_modes_of_one_comparison_are_of_one_model(name, rpm):
-    """FRFs that are set beside measured ones are those of the whole dynamic stiffness K + s C + s^2 M - s^4 N, line by line, of which the mode table has the poles. They had masses at nodes."""
+    """FRFs that are set beside measured ones are those of the whole dynamic stiffness K + s C + s^2
+    M - s^4 N, line by line, of which the mode table has the poles. They had masses at nodes."""
     spindle = load(ROOT / "scenes" / name)
     nodes, (low, high) = tuple(p.node for p in spindle.points), spindle.hammer.band
     lines = np.linspace(low, high, 60)

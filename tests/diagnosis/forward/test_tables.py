@@ -15,7 +15,8 @@ from thermospindle.model.scene.reading import load
 
 
 def test_derivatives_of_mode_tables():
-    """ln frequency and ln damping, by perturbation of the poles; at rest, where members of a pair must not swap from one side to the other, and at speed."""
+    """ln frequency and ln damping, by perturbation of the poles; at rest, where members of a pair
+    must not swap from one side to the other, and at speed."""
     scene = load(SCENES["reference"])
     for damping in (True, False):
         model = model_of(scene, mode_campaign(scene, CONDITIONS, 3, damping=damping))
@@ -44,8 +45,8 @@ def test_derivatives_of_shapes(name, real):
 
 @pytest.mark.parametrize("decay", [8.0, -3.0])
 def test_derivatives_of_mode_tables_under_a_window(decay):
-    """One that was not corrected, or corrected though there was none, at speed: damping ratios are those seen, a quarter more than the poles' own. Their
-    derivatives were wrong by as much."""
+    """One that was not corrected, or corrected though there was none, at speed: damping ratios are
+    those seen, a quarter more than the poles' own. Their derivatives were wrong by as much."""
     window = effect("window_damping")
     model = model_of(load(SCENES["symmetric"]), mode_campaign(load(SCENES["symmetric"]), CONDITIONS[1:], 3))
     model = replace(model, present=((window, {p.name: p.neutral for p in window.parameters} | {"decay": decay}),))

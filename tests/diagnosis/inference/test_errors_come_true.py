@@ -94,7 +94,8 @@ def test_bearings_that_differ_are_no_discrepancy_of_modes(spindle):
     ],
 )
 def test_what_two_programs_differ_by_in_a_bearing_is_no_discrepancy_of_modes(scene, name, share, hidden):
-    """What races give, where a row's forces act, whether a contact's constant is kept: found as that, without constant errors of modes, or modes that drift."""
+    """What races give, where a row's forces act, whether a contact's constant is kept: found as
+    that, without constant errors of modes, or modes that drift."""
     spindle = load(SCENES[scene])
     model = model_of(spindle, virtual_campaign(spindle, THREE, 4, [hidden], noise=Noise(3e-4, 3e-5), frequency=np.arange(400.0, 6000.1, 8.0)))
     found = evidence(model, fit(model))
@@ -106,7 +107,8 @@ def test_what_two_programs_differ_by_in_a_bearing_is_no_discrepancy_of_modes(sce
 
 
 def test_sensors_that_are_glued_by_hand_are_no_discrepancy_of_modes():
-    """Some tenths of a millimetre off and a degree askew, as in any laboratory: found as that. Without a place for it chi2 was 4 a number, and the verdict *unexplained* (another's campaign)."""
+    """Some tenths of a millimetre off and a degree askew, as in any laboratory: found as that.
+    Without a place for it chi2 was 4 a number, and the verdict *unexplained* (another's campaign)."""
     scene = load(SCENES["reference"])
     plans, world = (Plan(20.0, 0.0), Plan(60.0, 0.0), Plan(40.0, 7200 * RPM)), World(place=3e-4, askew=0.02)
     made = blind_campaign(scene, plans, (), 3, world, Record("line", told="noise"))
@@ -138,7 +140,8 @@ def test_pairs_cost_nothing(apart):
 
 @lru_cache
 def over_seeds(name: str) -> tuple[list[float], list[float], float, int]:
-    """Of ten campaigns of three tests chi2/n at the fit, chi2 at the truth in its standard deviations, and the sum of squares of so many standardised errors of what was drawn."""
+    """Of ten campaigns of three tests chi2/n at the fit, chi2 at the truth in its standard
+    deviations, and the sum of squares of so many standardised errors of what was drawn."""
     scene = load(SCENES[name])
     ratios, shares, squares, free = [], [], 0.0, 0
     for seed in range(10):
@@ -167,8 +170,8 @@ def test_residuals_come_true_over_many_seeds(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_errors_of_what_is_fitted_come_true_over_many_seeds(name):
-    """What was drawn comes back with errors of mean square 1 (measured: 0.95, 0.79 and 1.11), as far as so many of them tell: within the 99.9 % of a chi-squared. Of fits that had not settled it was 1.43 and 1.35, which were taken for errors a fifth
-    too small."""
+    """What was drawn comes back with errors of mean square 1 (measured: 0.95, 0.79 and 1.11), as far as so many of them tell: within
+    the 99.9 % of a chi-squared. Of fits that had not settled it was 1.43 and 1.35, which were taken for errors a fifth too small."""
     _, _, squares, free = over_seeds(name)
     low, high = stats.chi2.ppf([5e-4, 1 - 5e-4], free)
     assert low < squares < high

@@ -49,7 +49,8 @@ from thermospindle.model.machine import Condition
 
 @pytest.mark.parametrize(("hidden", "grows"), [((1.0, 1.8, 2.6), True), ((1.8, 1.8, 1.8), False)])
 def test_what_is_as_much_at_the_reference_does_not_grow_from_there(hidden, grows):
-    """A law of the data's own that starts at nothing at 20 C pays for sizes that are the same in every test, and none for those that go with temperature."""
+    """A law of the data's own that starts at nothing at 20 C pays for sizes that are the same in
+    every test, and none for those that go with temperature."""
     free = toy(3, 0.0, hidden)
     bound = toy(3, 0.0, hidden, reference=Condition(20.0))
     gain = evidence(bound.model, bound.fit).ln - evidence(free.model, free.fit).ln
@@ -106,7 +107,8 @@ def test_what_data_are_worth_with_mechanisms_as_fitted_has_no_price_of_their_siz
 
 @pytest.mark.parametrize(("size", "within"), [(0.0, 1.0), (1e-4, 1.6), (3e-4, 1.6), (5.5e-4, 2.0), (1e-3, 1.6), (1.7e-3, 2.0), (3e-3, 1.6), (1e-2, 1.6)])
 def test_the_size_of_the_discrepancy_is_learned(size, within):
-    """Of twenty campaigns at least eighteen learn the size that they were drawn with, or the next place of its grid; drift and damping, of which there is none, none."""
+    """Of twenty campaigns at least eighteen learn the size that they were drawn with, or the next
+    place of its grid; drift and damping, of which there is none, none."""
     right = [evidence(made.model, made.fit).learned for made in (toy(seed, size) for seed in range(20))]
     assert sum(size / within < learned.sizes[STIFFNESS] < within * size or learned.sizes[STIFFNESS] == size for learned in right) >= 18
     assert sum(learned.sizes[DAMPING] == 0.0 and learned.sizes[DRIFT] == 0.0 for learned in right) >= 14
@@ -126,8 +128,8 @@ def test_a_size_between_two_places_loses_nothing(size):
 
 
 def test_a_model_that_is_wrong_may_be_wrong_in_what_conditions_and_an_effect_do():
-    """In proportion: nothing for a model that is right, or a mode that does not move; `ACTION` times the frequencies' error of what moves, or the share that was learned of either. Of what an effect does in all tests
-    alike nothing: that is a constant error of modes."""
+    """In proportion: nothing for a model that is right, or a mode that does not move; `ACTION` times the frequencies' error of what
+    moves, or the share that was learned of either. Of what an effect does in all tests alike nothing: that is a constant error of modes."""
     parameters = [Nuisance(BUILD, "b", 0.01)] + [
         Nuisance(kind, kind, sd, test=t, modes=(i, i))
         for kind, sd in ((STIFFNESS_DRIFT, STIFFNESS_DRIFT_SD), (DAMPING_DRIFT, DAMPING_DRIFT_SD)) for t in (0, 1) for i in (0, 1)
@@ -207,7 +209,8 @@ def test_a_fit_and_the_evidence_have_one_prior():
 
 
 def test_the_posterior_beside_nuisances_that_are_kept_is_that_of_all_together():
-    """Mean, covariance and integral of a joint Gaussian in closed form; of nuisances without a width, with what two of them share, and of none but these."""
+    """Mean, covariance and integral of a joint Gaussian in closed form; of nuisances without a
+    width, with what two of them share, and of none but these."""
     random = np.random.default_rng(6)
     jacobian, y = random.standard_normal((40, 7)), random.standard_normal(40)
     scale, beside, own = np.array([1.0, 0.0, 0.3, 2.0]), random.standard_normal((4, 1)), np.tril(random.standard_normal((3, 3)))
@@ -296,8 +299,8 @@ def test_what_departures_gain_is_told(hidden, much, monkeypatch):
 
 
 def test_a_law_that_mechanics_gives_is_followed():
-    """Sizes that have nothing of their law are evidence for an effect whose law is assumed, and not for one whose law is exact, by more than e^5; where they
-    follow it the exact one has the more of it, for it had less to choose."""
+    """Sizes that have nothing of their law are evidence for an effect whose law is assumed, and not for one whose
+    law is exact, by more than e^5; where they follow it the exact one has the more of it, for it had less to choose."""
     for hidden, exact_gains in (((1.2, 4.0, 1.1), False), (2.0, True)):
         made = toy(3, 0.0, hidden=hidden, rows=200)
         mechanism = replace(made.mechanisms[0], effect=replace(made.mechanisms[0].effect, exact=True))
@@ -327,8 +330,10 @@ def test_what_is_left_out_is_predicted_from_the_rest(hidden):
 
 @pytest.mark.parametrize("drifting", [False, True])
 def test_what_is_off_by_the_same_in_all_tests_is_no_drift(drifting):
-    """An error of two modes among many that have none, each of them free to drift as well, and gains that drift by much. A constant of every two modes costs more than drift of each (41 in ln evidence), and so drift is learned; but what is
-    as much in every test is not told to drift. Another's campaign with nothing hidden was *unexplained* for that: the damping of one mode off by 7 % in all nine tests."""
+    """An error of two modes among many that have none, each of them free to drift as well, and gains
+    that drift by much. A constant of every two modes costs more than drift of each (41 in ln evidence),
+    and so drift is learned; but what is as much in every test is not told to drift. Another's campaign
+    with nothing hidden was *unexplained* for that: the damping of one mode off by 7 % in all nine tests."""
     random = np.random.default_rng(2)
     modes, tests, rows = 12, 6, 60
     parameters = [Nuisance(DAMPING, "c", DAMPING_SD, modes=(i, j)) for i in range(modes) for j in range(i, modes)]

@@ -43,8 +43,8 @@ def test_a_fit_rests(spindle):
 
 
 def test_a_fit_rests_where_the_gradient_is_right(spindle):
-    """What tolerances do to the matrices changes with an effect that grows in the fit. With what they did where the fit began its gradient was wrong, and it rested
-    in a valley 19 in cost above the end (a free bearing stiffness, where bonds soften by the half)."""
+    """What tolerances do to the matrices changes with an effect that grows in the fit. With what they did where the fit began its
+    gradient was wrong, and it rested in a valley 19 in cost above the end (a free bearing stiffness, where bonds soften by the half)."""
     hidden = (effect("bond_softening"), effect("bond_softening").typical())
     model = model_of(spindle, virtual_campaign(spindle, THREE, 3, effects=[hidden], frequency=np.arange(400.0, 6000.1, 16.0)))
     softer = next(m for m in free_forms(spindle) if m.name == "bearings radial stiffness")
@@ -81,7 +81,8 @@ class Ring(Problem):
 
 
 def test_a_bent_valley_is_followed_to_its_end(monkeypatch):
-    """In steps as short as its bends ask for. A fit had ended where a long one gained next to nothing, 30 in ln evidence behind, and of two effects of another program's campaign the wrong one was named."""
+    """In steps as short as its bends ask for. A fit had ended where a long one gained next to nothing,
+    30 in ln evidence behind, and of two effects of another program's campaign the wrong one was named."""
     monkeypatch.setattr("thermospindle.diagnosis.inference.fit.rates_of", lambda model, x, effects, rates: rates)
     problem = Ring()
     p, *_ = _settled(problem, np.array([0.3, np.sqrt(1 - 0.09) - 1]), None, 1.0, np.inf)
@@ -105,8 +106,8 @@ def softer(spindle):
 
 
 def test_from_afar_errors_are_enlarged_first(softer):
-    """A start six prior standard deviations off costs tens of times the noise: from there errors are taken larger first, as `AFAR` has it, and not from near. By the data's own errors
-    alone practice campaign g had fits of 51 linearisations."""
+    """A start six prior standard deviations off costs tens of times the noise: from there errors are taken larger first,
+    as `AFAR` has it, and not from near. By the data's own errors alone practice campaign g had fits of 51 linearisations."""
     model, m = softer
     problem = Problem(model, (m,))
     near = fit(model, (m,))
@@ -172,8 +173,8 @@ def test_a_step_ends_within_limits():
 
 
 def test_a_fit_does_not_stall_at_a_limit(spindle):
-    """A share that would be negative is held at nothing, and all else fitted beside it: no worse than without that parameter. It had gone on beyond, where
-    nothing changes, and steps that promised much there and gained nothing ended the fit."""
+    """A share that would be negative is held at nothing, and all else fitted beside it: no worse than without that parameter.
+    It had gone on beyond, where nothing changes, and steps that promised much there and gained nothing ended the fit."""
     conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (60.0, 0.0), (60.0, 7200.0))]
     at = Condition(60.0, 7200.0 * RPM)
     rings = asked_at(effect("thermal_gradient"), at)
@@ -216,7 +217,8 @@ def test_the_size_of_what_is_hidden(spindle):
 
 
 def test_what_a_mechanism_moves(spindle):
-    """Frequency and damping of every mode, against the poles with and without it; nothing where its law gives nothing, and nothing without one."""
+    """Frequency and damping of every mode, against the poles with and without it; nothing where its
+    law gives nothing, and nothing without one."""
     lost, values = effect("preload_loss"), {"loss": 0.02, "thermal_share": 1.0}
     made = virtual_campaign(spindle, COLD_AND_WARM, 4, [(lost, values)], drawn(spindle, 2, 4), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 16.0))
     model = model_of(spindle, made)
@@ -246,7 +248,8 @@ def test_of_several_starts_the_best_is_taken(spindle):
 
 @pytest.mark.parametrize(("compliance", "scanned"), [(0.2, False), (0.5, True)])
 def test_peaks_that_move_by_many_widths_are_followed(spindle, compliance, scanned):
-    """A mount that gives by a fifth more is found from the drawing, through all tempers, to the noise; by half as much again from a scan of sizes."""
+    """A mount that gives by a fifth more is found from the drawing, through all tempers, to the
+    noise; by half as much again from a scan of sizes."""
     softer = effect("mount_compliance")
     values = {"compliance": compliance, "thermal_share": 0.0}
     errors = drawn(spindle, 2, 4)
@@ -261,8 +264,9 @@ def test_peaks_that_move_by_many_widths_are_followed(spindle, compliance, scanne
 
 
 def test_a_part_of_its_own_may_go_and_come(spindle):
-    """A hub whose rim tilts by itself has two degrees of freedom more, and none where its web is stiff: fits from one side of that and from the other end at
-    one cost. The derivatives of the one did not fit the matrices of the other, and such an effect was no candidate without a word."""
+    """A hub whose rim tilts by itself has two degrees of freedom more, and none where its web is
+    stiff: fits from one side of that and from the other end at one cost. The derivatives of the one
+    did not fit the matrices of the other, and such an effect was no candidate without a word."""
     model = model_of(spindle, virtual_campaign(spindle, COLD_AND_WARM, 0, responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 8.0)))
     rim = next(m for m in variants(effect("hub_flexibility")) if m.choices == {"seat_share": 0.0})
     problem = Problem(model, (rim,))

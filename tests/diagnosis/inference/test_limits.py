@@ -45,7 +45,8 @@ def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have():
 
 @pytest.mark.parametrize("held", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
-    """A share from nothing to one, neutral at nothing: the integral over it alone, by quadrature; held at nothing where the data would have it less."""
+    """A share from nothing to one, neutral at nothing: the integral over it alone, by quadrature;
+    held at nothing where the data would have it less."""
     own, plain, random = (1.0, 0.0, 1.0), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
     monkeypatch.setattr("thermospindle.diagnosis.inference.evidence.own_grid", lambda m: {own: 0.0})
     jacobians = [np.column_stack([j, random.standard_normal(len(j))]) for j in plain.jacobians]
@@ -93,8 +94,9 @@ def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
 
 @pytest.mark.parametrize("errors", [1.0, 2.5])
 def test_what_a_shape_that_is_held_gives_up_does_not_depend_on_the_errors_of_its_fit(errors):
-    """Three standard deviations from where it is neutral, held by data that would have it farther: the integral over what is inside, by quadrature, of fits with errors as stated and as learned. That of a fit
-    with errors 2.5 times as large counted its prior as if they had been as stated, 0.6 off."""
+    """Three standard deviations from where it is neutral, held by data that would have it farther: the
+    integral over what is inside, by quadrature, of fits with errors as stated and as learned. That of
+    a fit with errors 2.5 times as large counted its prior as if they had been as stated, 0.6 off."""
     share, low, slope, information = Parameter("share", "1", 0.0, 0.0, 0.5, (-1.5, 1.5), "", ""), -3.0, 30.0, np.array([[50.0, 20.0], [20.0, 40.0]])
     p = np.array([0.0, low])
     for fitted in (1.0, 2.5):
@@ -130,8 +132,8 @@ def test_a_shape_with_a_law_of_the_datas_own_says_nothing_of_amounts():
     [(4, 1.2, 0.0, False), (8, 1.2, 0.0, False), (8, 1.7, 0.0, True), (4, 2.4, 0.99, False), (4, 2.4, 0.0, True), (1, 2.9, 0.0, False), (1, 3.1, 0.0, True)],
 )
 def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike, cannot):
-    """Sizes `off` standard errors below what they can be, in each of so many tests: independent errors make root-n as much of it, what is alike in all tests
-    hardly more than once. One that is well within makes no difference."""
+    """Sizes `off` standard errors below what they can be, in each of so many tests: independent errors make root-n
+    as much of it, what is alike in all tests hardly more than once. One that is well within makes no difference."""
     m = variants(effect("preload_loss"))[0]
     sd, low = 0.05, m.size.limits[0]
     covariance = sd**2 * (alike * np.ones((count, count)) + (1 - alike) * np.eye(count))
@@ -145,7 +147,8 @@ def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike,
 
 @pytest.mark.parametrize("count", [1, 5, 12, 20])
 def test_a_size_at_its_limit_is_said_to_be_beyond_it_as_seldom_with_many_tests_as_with_one(count):
-    """Sums of squares beyond a limit grow with the number of tests: against those of one a truth at the limit was impossible in half of all campaigns of twenty."""
+    """Sums of squares beyond a limit grow with the number of tests: against those of one a truth at
+    the limit was impossible in half of all campaigns of twenty."""
     m = variants(effect("preload_loss"))[0]
     sd, low, random = 0.02, m.size.limits[0], np.random.default_rng(count)
     drawn = low + sd * random.standard_normal((1000, count))

@@ -119,8 +119,8 @@ def test_noise_is_found_in_the_scatter(damping, noise):
 
 @pytest.mark.parametrize(("noise", "least", "most"), [(Noise(0.0, 1e-4), 0.9, 1.8), (NOISE, 0.9, 1.1)], ids=["the same everywhere", "of value"])
 def test_noise_of_peaks_is_told_by_the_lines_between(noise, least, most):
-    """Single lines at peaks a line wide, ten draws: what the noise there may be is open, but not by what blocks beside a peak lack of it (3.9 times the
-    noise before), and noise of value is in it even where a draw shows none (chi2 of 37 at a peak by the best estimate)."""
+    """Single lines at peaks a line wide, ten draws: what the noise there may be is open, but not by what blocks beside a peak lack of it
+    (3.9 times the noise before), and noise of value is in it even where a draw shows none (chi2 of 37 at a peak by the best estimate)."""
     exact, ratios = modal_frf(FREQUENCY, SHARP), []
     for seed in range(10):
         value = noisy(exact, np.random.default_rng(seed), noise)
@@ -135,7 +135,8 @@ def test_noise_of_peaks_is_told_by_the_lines_between(noise, least, most):
 @pytest.mark.parametrize("lines", [np.arange(60.0, 6000.1, 2.0), np.arange(400.0, 6000.1, 8.0)], ids=["fine", "coarse, from 400 Hz"])
 @pytest.mark.parametrize("power", [1, 2])
 def test_noise_of_an_accelerometer_that_was_integrated(power, lines):
-    """A velocity's noise falls as 1/f, a displacement's as 1/f^2, by 1e4 over the wider band: residuals of the exact FRF have their stated errors at all lines."""
+    """A velocity's noise falls as 1/f, a displacement's as 1/f^2, by 1e4 over the wider band:
+    residuals of the exact FRF have their stated errors at all lines."""
     random = np.random.default_rng(3)
     scale = (60.0 / lines) ** power
     exact = modal_frf(lines) * scale
@@ -211,8 +212,9 @@ def test_standard_errors_of_few_hits_are_smoothed(damping):
 
 @pytest.mark.parametrize("known", [REPEATS, CAMPAIGN])
 def test_noise_that_rises_with_frequency_is_right_in_every_part_of_the_band(known):
-    """A hammer's force falls, and the noise over it rises, five times here: with the errors of eight hits, or a noise stated flat that is right on the
-    mean, chi2 is that of noise in every quarter of the band (0.66 to 1.8 before; five_bearing was told missing what it has)."""
+    """A hammer's force falls, and the noise over it rises, five times here: with the errors of
+    eight hits, or a noise stated flat that is right on the mean, chi2 is that of noise in every
+    quarter of the band (0.66 to 1.8 before; five_bearing was told missing what it has)."""
     squares = np.zeros(4)
     for seed in range(6):
         random = np.random.default_rng(seed)
@@ -233,8 +235,8 @@ def test_noise_that_rises_with_frequency_is_right_in_every_part_of_the_band(know
 
 
 def test_noise_of_a_displacement_that_was_differentiated_twice():
-    """Even in receptance, it rises with the fourth power of frequency in an accelerance, from the first line on: nothing hidden was *unexplained* with 2.1 standard errors, for the lowest
-    lines were taken to have none."""
+    """Even in receptance, it rises with the fourth power of frequency in an accelerance, from the first line
+    on: nothing hidden was *unexplained* with 2.1 standard errors, for the lowest lines were taken to have none."""
     exact, omega = modal_frf(FREQUENCY), (2 * np.pi * FREQUENCY) ** 2
     low = []
     for seed in range(4):

@@ -25,8 +25,8 @@ TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
 
 
 def test_a_joint_that_is_drawn_alike_all_around_is_not_built_so(spindle):
-    """Another's campaign with nothing hidden: the flange 1 % stiffer against one tilt and 1.5 % less against the other, in every test. Told as an element that
-    drifts, at 158 in ln evidence."""
+    """Another's campaign with nothing hidden: the flange 1 % stiffer against one tilt and 1.5 %
+    less against the other, in every test. Told as an element that drifts, at 158 in ln evidence."""
     joints = tuple(
         replace(j, stiffness=(*j.stiffness[:3], 1.01 * j.stiffness[3], 0.985 * j.stiffness[4])) if j.name == "flange" else j for j in spindle.structure.joints
     )
@@ -41,8 +41,8 @@ def test_a_joint_that_is_drawn_alike_all_around_is_not_built_so(spindle):
 
 
 def test_hammers_that_tell_the_force_otherwise_in_each_test_are_no_missing_effect(spindle):
-    """Another's simulator, three campaigns with nothing hidden: the force of each of two hammers off by 0.4 % from test to test, and all three were *two effects*, a hammer beside its point
-    and rings that are askew, by 1063 to 1740 in ln evidence."""
+    """Another's simulator, three campaigns with nothing hidden: the force of each of two hammers off by 0.4 % from test to
+    test, and all three were *two effects*, a hammer beside its point and rings that are askew, by 1063 to 1740 in ln evidence."""
     campaign = virtual_campaign(spindle, TESTS, 5, [], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 16.0))
     random = np.random.default_rng(8)
     tests = [
@@ -65,7 +65,8 @@ def test_hammers_whose_calibration_is_off_are_no_missing_effect(spindle):
 
 
 def test_hammers_that_hit_beside_their_points_are_no_missing_effect(spindle):
-    """The same simulator: each of two hammers off by 0.2 mm, another way in each test by half of that, left errors of 10 times those stated, and `hammer_position` beside everything."""
+    """The same simulator: each of two hammers off by 0.2 mm, another way in each test by half of
+    that, left errors of 10 times those stated, and `hammer_position` beside everything."""
     random = np.random.default_rng(4)
     always, tests = 2e-4 * random.standard_normal((2, 2)), []
     for k, condition in enumerate(TESTS):
@@ -92,7 +93,8 @@ def test_a_sensor_that_ages_is_no_missing_effect(spindle):
 
 
 def test_an_alloy_that_expands_otherwise_than_its_table_is_no_missing_effect(spindle):
-    """By 3 %, of which half may be the steel's; 10 % is `expansion_mismatch`. What lies between is *none* as long as that is not likelier by the loss that a false alarm is."""
+    """By 3 %, of which half may be the steel's; 10 % is `expansion_mismatch`. What lies between is
+    *none* as long as that is not likelier by the loss that a false alarm is."""
 
     def found(error: float):
         built = with_material(spindle, expanding(spindle.materials["aluminium"], error))
@@ -105,8 +107,9 @@ def test_an_alloy_that_expands_otherwise_than_its_table_is_no_missing_effect(spi
 
 
 def test_a_thermometer_that_is_wrong_in_one_test_is_told(spindle):
-    """Another's campaign, whose spindle was at 48 C where its file says 40: `expansion_mismatch` was named, 98.5 % probable, by sizes that are nothing in all other tests: to the quadratic its law held, for its shape, which a fit moves in proportion to what it changes, moved that
-    test alone."""
+    """Another's campaign, whose spindle was at 48 C where its file says 40: `expansion_mismatch` was
+    named, 98.5 % probable, by sizes that are nothing in all other tests: to the quadratic its law
+    held, for its shape, which a fit moves in proportion to what it changes, moved that test alone."""
     at = (20.0, 40.0, 50.0, 60.0)
     true = mode_campaign(spindle, [Condition(48.0 if t == 40.0 else t) for t in at], 3, [])
     told = replace(true, tests=tuple(replace(test, temperature=t) for test, t in zip(true.tests, at, strict=True)))
@@ -140,8 +143,9 @@ def test_a_drawing_that_is_off_is_no_missing_effect(spindle):
 
 @pytest.mark.parametrize(("share", "learned"), [(0.0, {0.0}), (0.1, {0.1})])
 def test_what_temperature_does_to_each_mode_otherwise_is_no_missing_effect(spindle, share, learned):
-    """Every mode's change of frequency with temperature off by a tenth of it, alike in all tests: blind campaign 2464 was `ball_material` for that, beside which what an effect does might be off, and what temperature does might not.
-    Of a model that is right the size learned is none."""
+    """Every mode's change of frequency with temperature off by a tenth of it, alike in all tests:
+    blind campaign 2464 was `ball_material` for that, beside which what an effect does might be off,
+    and what temperature does might not. Of a model that is right the size learned is none."""
     made = mode_campaign(spindle, [Condition(t) for t in (20.0, 35.0, 50.0, 60.0)], 3)
     cold = made.tests[0].modes
     off = share * np.random.default_rng(3).standard_normal(len(cold))

@@ -25,8 +25,8 @@ TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
 
 @pytest.mark.parametrize(("promise", "kind", "weighed"), [(4.0, {}, True), (1.0, {}, False), (4.0, {"own_law": True}, False), (11.0, {"free": True}, False), (13.0, {"free": True}, True)])
 def test_a_second_cause_that_hardly_shows_is_weighed(spindle, monkeypatch, promise, kind, weighed):
-    """Beside one that leaves no misfit: blind campaigns 902 and 921 were answered the first of two for sure, for what promised less than 12 in ln evidence was not even asked. The more
-    there is to choose, the more is asked."""
+    """Beside one that leaves no misfit: blind campaigns 902 and 921 were answered the first of two for sure, for
+    what promised less than 12 in ln evidence was not even asked. The more there is to choose, the more is asked."""
     model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, []))
     bond, preload = (variants(effect(name))[0] for name in ("bond_softening", "preload_loss"))
     preload = replace(preload, **kind)
@@ -64,8 +64,8 @@ def test_two_constant_causes_are_joined_while_errors_are_enlarged(spindle):
 @pytest.mark.slow
 @pytest.mark.parametrize("tests", [TESTS, TESTS[::2]])
 def test_two_constant_causes_are_both_named(spindle, tests):
-    """By the whole diagnosis. Of three tests a light resonance at 15 kHz, far beyond the band, stood in for the disk's mass, and a mass at the sensor was named; of two the true pair was
-    never fitted, and a mass at the sensor, of no size, named beside it."""
+    """By the whole diagnosis. Of three tests a light resonance at 15 kHz, far beyond the band, stood in for the disk's mass, and
+    a mass at the sensor was named; of two the true pair was never fitted, and a mass at the sensor, of no size, named beside it."""
     found = diagnose(spindle, of_a_disk_and_a_mount(spindle, tests))
     assert (found.verdict.word, set(found.verdict.effects)) == ("two effects", {"added_disk", "mount_compliance"})
     told = found.verdict.candidates[0].told
@@ -75,8 +75,8 @@ def test_two_constant_causes_are_both_named(spindle, tests):
 
 
 def test_what_came_first_is_tried_without(spindle):
-    """A bond that softens and a weaker preload, and a third mechanism that came before the preload: of the rest, which nobody fitted, each two are, and those that
-    are known are not again."""
+    """A bond that softens and a weaker preload, and a third mechanism that came before the preload:
+    of the rest, which nobody fitted, each two are, and those that are known are not again."""
     names = ("bond_softening", "preload_loss", "modulus_softening")
     mechanisms = bond, preload, modulus = [variants(effect(name))[0] for name in names]
     hidden = [(m.effect, m.values(m.size.typical, [q.neutral for q in m.shape])) for m in (bond, preload)]
@@ -98,7 +98,8 @@ def test_what_came_first_is_tried_without(spindle):
 
 @pytest.mark.parametrize(("size", "known", "again"), [(0.0, -100.0, True), (0.0, 0.0, False), (0.1, -100.0, False)])
 def test_what_fell_behind_without_one_that_does_nothing_is_fitted_again(spindle, size, known, again):
-    """A bond that softens, and a modulus that does nothing beside it; with the bond alone 100 behind in ln evidence that fit had stalled, not so where the modulus does something."""
+    """A bond that softens, and a modulus that does nothing beside it; with the bond alone 100
+    behind in ln evidence that fit had stalled, not so where the modulus does something."""
     bond, modulus = (variants(effect(name))[0] for name in ("bond_softening", "modulus_softening"))
     model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, [(bond.effect, bond.values(bond.size.typical, [q.neutral for q in bond.shape]))]))
     alone, both = (Hypothesis(f, evidence(model, f)) for f in (fit(model, of, tempers=TEMPERS[-2:]) for of in ([bond], [bond, modulus])))
@@ -113,7 +114,8 @@ def test_what_fell_behind_without_one_that_does_nothing_is_fitted_again(spindle,
 
 
 def test_two_effects_without_laws_are_exchanged_for_others(spindle):
-    """A bond that softens and a weaker preload, and a pair that leads with neither's law: in the place of either every other effect is tried. Not where one has its law."""
+    """A bond that softens and a weaker preload, and a pair that leads with neither's law: in the
+    place of either every other effect is tried. Not where one has its law."""
     bond, preload, modulus = (variants(effect(name))[0] for name in ("bond_softening", "preload_loss", "modulus_softening"))
     hidden = [(m.effect, m.values(m.size.typical, [q.neutral for q in m.shape])) for m in (bond, preload)]
     model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, hidden))

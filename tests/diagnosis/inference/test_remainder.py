@@ -97,7 +97,8 @@ def test_where_nothing_is_left_none_is_found(spindle):
 
 @pytest.mark.parametrize(("frequency", "damping", "resonates"), [(1700.0, 0.02, True), (6500.0, 0.02, True), (15199.0, 0.02, False), (300.0, 0.02, False), (1700.0, 0.3, False)])
 def test_far_beyond_the_band_it_is_a_mass_that_moves_along(model, frequency, damping, resonates):
-    """Two constant causes were told as a mass at the sensor and a softer mount, for an oscillator at 15 kHz had a disk's mass on the hub; below the band it is a spring to the ground."""
+    """Two constant causes were told as a mass at the sensor and a softer mount, for an oscillator
+    at 15 kHz had a disk's mass on the hub; below the band it is a spring to the ground."""
     assert _resonates(model, Resonance(frequency, damping, ())) == resonates
 
 
@@ -133,8 +134,9 @@ def test_derivatives_by_its_parameters(model):
 
 @pytest.mark.slow
 def test_none_is_taken_for_what_changes_from_test_to_test(spindle):
-    """A flange that gives in one direction, more and more when warm: two resonances were taken up beside the modes that drifted for it (here at 6916 Hz, +33 in
-    ln evidence), and with them in its way the flange was left 211 in ln evidence short of what it reaches, its drawing said to be 43 % off."""
+    """A flange that gives in one direction, more and more when warm: two resonances were taken up
+    beside the modes that drifted for it (here at 6916 Hz, +33 in ln evidence), and with them in its way
+    the flange was left 211 in ln evidence short of what it reaches, its drawing said to be 43 % off."""
 
     def chain(spindle, condition, values, chain):
         d = np.diag([1.0, np.exp(values["mass"] / 2 / (1 + np.exp((42 - condition.temperature) / 5))), 1.0, 1.0, 1.0])
@@ -175,7 +177,8 @@ def rubber(cold: float, warm: float) -> Effect:
 
 @pytest.mark.parametrize("moves", [False, True])
 def test_one_that_does_not_move_is_told_about_none(moves):
-    """How its frequency drifts stays within 0.5 % of none, however often its parameters are counted anew from where they were fitted: in blind campaign 2155, which had no resonance, one moved by 6 %."""
+    """How its frequency drifts stays within 0.5 % of none, however often its parameters are counted
+    anew from where they were fitted: in blind campaign 2155, which had no resonance, one moved by 6 %."""
     seen = Resonance(1000.0, 0.02, (0.01, 0.0))
     fitted = np.array([0.5, 0.0, 1.0, 0.0, 2.0, -1.0])
     there, left = _centred(seen, fitted, moves)
@@ -223,7 +226,8 @@ def test_below_all_modes_there_is_no_resonance_and_a_verdict(spindle):
 
 @pytest.mark.parametrize("settles", [True, False])
 def test_what_fitting_on_would_explain_is_no_resonance(monkeypatch, settles):
-    """A grinding spindle's soft bond, fitted but not settled, left what looked like a resonance of its table at 876 Hz; settled it had 20 in ln evidence more than beside one."""
+    """A grinding spindle's soft bond, fitted but not settled, left what looked like a resonance of
+    its table at 876 Hz; settled it had 20 in ln evidence more than beside one."""
     module = "thermospindle.diagnosis.inference.resonance"
     own = SimpleNamespace(learned=SimpleNamespace(errors=1.0), ln=0.0)
     early, late = (SimpleNamespace(mechanisms=("some",), fit=SimpleNamespace(point=np.zeros(1), count=100), evidence=own, excess=0.0) for _ in range(2))

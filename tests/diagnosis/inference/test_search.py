@@ -35,8 +35,8 @@ TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
 
 
 def test_what_stalls_on_its_way_is_settled_from_its_fit(spindle, monkeypatch):
-    """Of the two starts the one that costs less may stall: campaign 413 of the blind study had an explanation fall by 780 in ln evidence there, and 404 one
-    by 116,000. What ends below its promise is fitted from the other start too."""
+    """Of the two starts the one that costs less may stall: campaign 413 of the blind study had an explanation fall by
+    780 in ln evidence there, and 404 one by 116,000. What ends below its promise is fitted from the other start too."""
     model = model_of(spindle, virtual_campaign(spindle, TESTS[:2], 5, [], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 32.0)))
     m = variants(effect("preload_loss"))[0]
     first = fit(model, [m])
@@ -57,7 +57,8 @@ def test_what_stalls_on_its_way_is_settled_from_its_fit(spindle, monkeypatch):
 
 
 def test_a_fit_with_wide_priors_does_not_start_one_with_narrow_priors_from_a_wall(spindle):
-    """What was learned to be nothing is taken from it, and all else left: campaign 691 of the blind study had an explanation that cost 32,000 start at 4e8."""
+    """What was learned to be nothing is taken from it, and all else left: campaign 691 of the blind
+    study had an explanation that cost 32,000 start at 4e8."""
     model = model_of(spindle, virtual_campaign(spindle, TESTS[:2], 5, [], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 32.0)))
     first = fit(model)
     learned = undrifted(steady(evidence(model, first).learned))
@@ -71,7 +72,8 @@ def test_a_fit_with_wide_priors_does_not_start_one_with_narrow_priors_from_a_wal
 
 
 def test_a_promise_is_over_the_model_without_it_at_the_same_place(spindle):
-    """A fit that has not arrived holds derivatives of an earlier point: in campaign 640 of the blind study every mechanism promised 29,500 by that."""
+    """A fit that has not arrived holds derivatives of an earlier point: in campaign 640 of the
+    blind study every mechanism promised 29,500 by that."""
     model = model_of(spindle, virtual_campaign(spindle, TESTS[:2], 5, [], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 32.0)))
     about, mechanism = fit(model), variants(effect("preload_loss"))[0]
     learned = steady(evidence(model, about).learned)
@@ -84,7 +86,8 @@ def test_a_promise_is_over_the_model_without_it_at_the_same_place(spindle):
 
 
 def test_what_hardly_shows_while_errors_are_enlarged_is_found_where_a_misfit_is_small(spindle):
-    """A delay of half a microsecond in one channel, by hundreds in ln evidence, which thirty times as large errors hide. Blind campaign 2448 was answered *none*: beside a misfit, told by errors some per cent larger, nothing was asked at the errors as they are."""
+    """A delay of half a microsecond in one channel, by hundreds in ln evidence, which thirty times as large errors hide. Blind campaign
+    2448 was answered *none*: beside a misfit, told by errors some per cent larger, nothing was asked at the errors as they are."""
     delay = effect("channel_delay")
     lines, late = np.arange(400.0, 6000.1, 24.0), np.array([0.0, 0.5e-6, 0.0])
     made = virtual_campaign(spindle, TESTS[:2], 5, [], drawn(spindle, 2, 5), responses=(1, 3, 6), frequency=lines)
@@ -102,7 +105,8 @@ def test_what_hardly_shows_while_errors_are_enlarged_is_found_where_a_misfit_is_
 
 
 def test_what_moves_peaks_far_is_found_by_a_scan_where_screening_overlooks_it(spindle):
-    """A flange that softens by 12 %, of which what screening promises is but a small part. In blind campaign 2316 it was not among the first ten, and another element was told; of what cannot be seen nothing is fitted."""
+    """A flange that softens by 12 %, of which what screening promises is but a small part. In blind campaign
+    2316 it was not among the first ten, and another element was told; of what cannot be seen nothing is fitted."""
     softens = drifting(
         "flange stiffness", name="softens", title="", equation="", law=lambda temperature, speed, values: values["change"] * (temperature - 20) / 40,
         parameters=(Parameter("change", "%", 0.0, 5.0, 5.0, (-100.0, 100.0), "", ""),), source="",
@@ -140,8 +144,8 @@ def test_a_mass_that_strained_tolerances_hide_is_found(spindle):
 
 
 def test_ways_that_the_data_do_not_tell_apart_are_told_as_such(spindle):
-    """A fifth of the preload lost, in tests at 60 C alone: whether it was lost at assembly or comes with temperature makes no difference to them. Screening chose one, and
-    practice campaign d was answered `common_share` 1 without an error where 0 was hidden."""
+    """A fifth of the preload lost, in tests at 60 C alone: whether it was lost at assembly or comes with temperature makes no
+    difference to them. Screening chose one, and practice campaign d was answered `common_share` 1 without an error where 0 was hidden."""
     lost, hot = effect("preload_loss"), (Condition(60.0), Condition(60.0, 7200 * RPM))
     model = model_of(spindle, mode_campaign(spindle, hot, 3, [(lost, {"loss": 0.2, "thermal_share": 1.0})]))
     every = variants(lost)
@@ -165,7 +169,8 @@ def test_ways_that_the_data_do_not_tell_apart_are_told_as_such(spindle):
 
 
 def test_a_way_that_promised_next_to_nothing_is_not_followed(spindle):
-    """Of a gain on one channel the eight others: on a machine-tool spindle half of a diagnosis went into these. Not where screening was of one effect, and two explain the data."""
+    """Of a gain on one channel the eight others: on a machine-tool spindle half of a diagnosis went
+    into these. Not where screening was of one effect, and two explain the data."""
     gain = effect("sensor_gain")
     model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, [(gain, {"gain": 0.1, "channel": 0.0})]))
     first, second, third = variants(gain)[:3]
@@ -188,8 +193,8 @@ def test_a_way_that_promised_next_to_nothing_is_not_followed(spindle):
 
 
 def test_ways_are_asked_of_what_is_needed(spindle, monkeypatch):
-    """Of a preload that was lost, with or without a gain beside it that does nothing: not those of an explanation that an effect less, or nothing, does as well as, nor, where it is needed, of an effect of no size.
-    A third of a diagnosis went into these."""
+    """Of a preload that was lost, with or without a gain beside it that does nothing: not those of an explanation that an effect
+    less, or nothing, does as well as, nor, where it is needed, of an effect of no size. A third of a diagnosis went into these."""
     preload, gain = (variants(effect(name)) for name in ("preload_loss", "sensor_gain"))
     model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, [(preload[0].effect, preload[0].effect.typical())]))
     hypotheses = []
@@ -221,7 +226,8 @@ def test_ways_are_asked_of_what_is_needed(spindle, monkeypatch):
 
 
 def test_a_law_of_the_datas_own_is_asked_for_each_law_that_its_effect_has(spindle):
-    """A preload lost by temperature alone. Of a machine-tool spindle a law of the data's own was fitted better than the one that screening chose, and the right one was never asked: 87 % where it has 99.7 %."""
+    """A preload lost by temperature alone. Of a machine-tool spindle a law of the data's own was fitted
+    better than the one that screening chose, and the right one was never asked: 87 % where it has 99.7 %."""
     lost = effect("preload_loss")
     model = model_of(spindle, mode_campaign(spindle, TESTS, 3, [(lost, {"loss": 0.2, "thermal_share": 1.0})]))
     named = variants(lost)
@@ -268,8 +274,8 @@ def test_what_promised_most_at_first_is_followed_until_one_explains_the_data(mon
 
 
 def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):
-    """A campaign of another's, with an absorber, left it at a chi2 of 729 a number, and bearing damping of 0 +- 6 % at 1.2. An effect that does
-    something says nothing of it."""
+    """A campaign of another's, with an absorber, left it at a chi2 of 729 a number, and bearing
+    damping of 0 +- 6 % at 1.2. An effect that does something says nothing of it."""
     m = variants(effect("preload_loss"))[0]
     for hidden in ([], [(m.effect, m.values(m.size.typical, [q.neutral for q in m.shape]))]):
         model = model_of(spindle, mode_campaign(spindle, TESTS, 3, hidden))
@@ -287,8 +293,9 @@ def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_do
 
 
 def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
-    """The turning part is warmer by a law of temperature, at rest too, where no friction heats it. Its formula's law explains little of that; a law of the
-    data's own all, and reads it off: nothing at 20 C, then in proportion. Half as much is what coefficients of expansion 4 % off do, and told as that."""
+    """The turning part is warmer by a law of temperature, at rest too, where no friction heats it. Its
+    formula's law explains little of that; a law of the data's own all, and reads it off: nothing at 20
+    C, then in proportion. Half as much is what coefficients of expansion 4 % off do, and told as that."""
     conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (40.0, 0.0), (60.0, 0.0), (60.0, 7200.0))]
     rings = asked_at(effect("thermal_gradient"), Condition(60.0, 7200.0 * RPM))
     neutral = {q.name: q.neutral for q in rings.parameters}
@@ -313,8 +320,8 @@ def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
 
 
 def test_a_law_that_runs_against_its_own_is_anothers(spindle):
-    """A flange that stiffened by 0.2 % where it was warm or turned was named a fit that loosens with warmth: of sizes that it could have, less and less of them, for a tolerance of the
-    flange made up for what all tests have in common."""
+    """A flange that stiffened by 0.2 % where it was warm or turned was named a fit that loosens with warmth: of sizes
+    that it could have, less and less of them, for a tolerance of the flange made up for what all tests have in common."""
     conditions = (Condition(20.0), Condition(40.0), Condition(60.0))
     model = model_of(spindle, mode_campaign(spindle, conditions, 1, errors=drawn(spindle, 3, 1)))
     law = variants(effect("flange_fit_loosening"))[0]

@@ -70,8 +70,9 @@ def toy(
     drawing: str = BUILD,
     reference: Condition | None = None,
 ) -> Toy:
-    """Data drawn with a discrepancy of the size `stiffness`, build tolerances (or other nuisances of that kind, the `drawing`) `build` times those stated, and, with a mechanism in the fit, a `hidden` size in every test, of which the first
-    tolerance cannot be told from `confused` times its change; with a `reference` its law is the data's own and grows from there."""
+    """Data drawn with a discrepancy of the size `stiffness`, build tolerances (or other nuisances of that kind, the `drawing`)
+    `build` times those stated, and, with a mechanism in the fit, a `hidden` size in every test, of which the first tolerance
+    cannot be told from `confused` times its change; with a `reference` its law is the data's own and grows from there."""
     random = np.random.default_rng(seed)
     parameters = [Nuisance(drawing, f"b{i}", 0.01) for i in range(3)] + [
         Nuisance(STIFFNESS, f"k{i}", STIFFNESS_SD, modes=(i, i)) for i in range(8)

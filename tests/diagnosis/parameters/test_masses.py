@@ -52,7 +52,8 @@ def of(body, found, dofs):
     [("shaft", "height of the centre of mass", 2), ("shaft", "place along x of the centre of mass", 0), ("shaft", "place along y of the centre of mass", 1), ("seat", "place along x of the centre of mass", 0)],
 )
 def test_a_centre_of_mass_that_is_off(spindle, body, name, way):
-    """As two particles have it, a little taken away on one side of the centre and put on the other: first moment alone. Whole, it is off by a radius of gyration."""
+    """As two particles have it, a little taken away on one side of the centre and put on the other:
+    first moment alone. Whole, it is off by a radius of gyration."""
     point, found = changes(spindle)
     own = spindle.structure.body(body)
     arm = np.sqrt(np.mean(own.inertia[:2]) / own.mass)
@@ -97,7 +98,8 @@ def test_masses_and_inertias_are_those_of_a_body_that_has_more(spindle):
 
 
 def test_a_shaft_that_is_heavier_towards_its_end_weighs_as_much():
-    """Nothing for a shaft of even mass as a whole, and as much about its middle: the first two of Legendre's polynomials; three terms of a shaft and four of its housing."""
+    """Nothing for a shaft of even mass as a whole, and as much about its middle: the first two of
+    Legendre's polynomials; three terms of a shaft and four of its housing."""
     spindle = load(ROOT / "scenes" / "free_shaft")
     assert mass_terms(spindle) == ()  # it stands still, and is of one piece
     structure = replace(spindle.structure, shafts=tuple(replace(s, turns=True) for s in spindle.structure.shafts))
@@ -114,7 +116,8 @@ def test_a_shaft_that_is_heavier_towards_its_end_weighs_as_much():
 
 @pytest.mark.parametrize("which", ["polar inertia of the hub", "mass and inertia of the shaft"])
 def test_masses_that_are_off_are_no_disk_and_no_sensors(spindle, which):
-    """A newcomer's simulator with nothing hidden, every mass and inertia off by some thousandths: `added_disk` or `sensor_mass` for the polar inertia of its hub alone, 30 in ln evidence."""
+    """A newcomer's simulator with nothing hidden, every mass and inertia off by some thousandths:
+    `added_disk` or `sensor_mass` for the polar inertia of its hub alone, 30 in ln evidence."""
     if which == "polar inertia of the hub":
         share = {"hub": lambda b: {"inertia": (*b.inertia[:2], 0.995 * b.inertia[2])}}
     else:

@@ -41,8 +41,8 @@ def test_sizes_have_a_proper_prior(departure):
 
 @pytest.mark.parametrize("departure", [0.0, 0.3, 1.0])
 def test_what_grows_from_a_reference_is_nothing_there(departure):
-    """Straight with temperature and with speed; departures are those of a process of the same likeness since the reference: x(c) - x(reference), of which the covariance
-    follows from that of x at the tests and there. An offset is the same in all tests."""
+    """Straight with temperature and with speed; departures are those of a process of the same likeness since the reference: x(c)
+    - x(reference), of which the covariance follows from that of x at the tests and there. An offset is the same in all tests."""
     conditions = [Condition(20.0), Condition(40.0), Condition(60.0), Condition(0.0), Condition(60.0, 7200 * RPM), Condition(60.0, -7200 * RPM)]
     reference = conditions[0]
     found = size_covariance(conditions, 2.0, departure, 0.0, reference)
@@ -56,7 +56,8 @@ def test_what_grows_from_a_reference_is_nothing_there(departure):
 
 
 def test_one_size_is_of_the_tests_that_tell_it():
-    """A test at the reference, where a law of the data's own is nothing by its definition, has the error of its prior and told nearly all; tests that tell count by their precision, and where the
+    """A test at the reference, where a law of the data's own is nothing by its definition, has the
+    error of its prior and told nearly all; tests that tell count by their precision, and where the
     data tell of none all are alike. The root is that of what the sizes are counted in."""
     conditions = [Condition(20.0), Condition(45.0), Condition(60.0)]
     loss = next(m for m in variants(by_name("preload_loss")))
@@ -200,8 +201,9 @@ def test_an_element_that_drifts_whole_is_the_sum_of_its_directions(spindle, mode
 
 
 def test_cross_coupled_stiffness_feeds_one_whirl_and_damps_the_other():
-    """Of a pair of modes that coincides (symmetric scene, at rest) one whirl loses the damping that the other gains, s -> s -+ i k_xy phi^2 / (2 i omega) to
-    first order, and their mean frequency stays (Friswell and others, 2010, 7.3); what is exact of the residual's derivative is its difference."""
+    """Of a pair of modes that coincides (symmetric scene, at rest) one whirl loses the damping that the
+    other gains, s -> s -+ i k_xy phi^2 / (2 i omega) to first order, and their mean frequency stays
+    (Friswell and others, 2010, 7.3); what is exact of the residual's derivative is its difference."""
     scene = load(ROOT / "tests" / "scenes" / "symmetric")
     m = next(m for m in free_forms(scene) if m.name == "bearings cross-coupled stiffness")
     campaign = virtual_campaign(scene, [Condition(20.0)], 1, frequency=np.arange(400.0, 6000.1, 80.0))
@@ -239,7 +241,8 @@ def test_what_turns_that_drifts_is_a_drawing_of_another_mass(spindle, form, kept
 
 @pytest.mark.parametrize(("label", "moves"), [("", (1, 1, 1)), (" across the axis", (1, 1, 0)), (" along the axis", (0, 0, 1))])
 def test_what_turns_may_be_held_from_outside(spindle, label, moves):
-    """By so many N/um at the hub's centre, either way: what the motion of the hub's centre makes of K, and nothing else; no effect changes the same."""
+    """By so many N/um at the hub's centre, either way: what the motion of the hub's centre makes of
+    K, and nothing else; no effect changes the same."""
     m = next(m for m in free_forms(spindle) if m.name == f"spring from hub to ground{label}")
     plain = operating_point(spindle, CONDITIONS[2], ())
     rows = motion_rows(plain.chain, "hub", [0.0, 0.0, spindle.turning.z])[:3]
@@ -290,9 +293,10 @@ def test_a_flexible_shaft_may_be_held_where_it_is_measured(machine_tool):
 
 @pytest.mark.parametrize("name", ["preload_loss", "lubricant_film", "thermal_gradient"])
 def test_beyond_its_limits_a_size_goes_straight_on(spindle, model, name):
-    """Continuous at the limit, and three equal steps beyond it change the matrices equally, along the slope inside; residuals are those of such matrices, whose derivative by
-    the size is their difference beyond the limit too. Of residuals that went straight on themselves a damping a fifth beyond was wrong by many errors, and fits stalled (campaign
-    728 of the blind study: 1800 in ln evidence short)."""
+    """Continuous at the limit, and three equal steps beyond it change the matrices equally, along the
+    slope inside; residuals are those of such matrices, whose derivative by the size is their difference
+    beyond the limit too. Of residuals that went straight on themselves a damping a fifth beyond was
+    wrong by many errors, and fits stalled (campaign 728 of the blind study: 1800 in ln evidence short)."""
     found = {e.name: e for e in usable(spindle)}
     m = variants(found[name])[0]
     problem = Problem(model, [m])

@@ -18,7 +18,8 @@ def hill(size: float, top: float) -> float:
 
 @pytest.mark.parametrize("constant", [True, False])
 def test_errors_that_could_be_constant_or_drift_are_the_likelier(constant):
-    """Either alone is likely, one much more, and what is found on the way to the other leads nowhere by a step of one size: 38 in ln evidence below, of a stranger's grinding spindle."""
+    """Either alone is likely, one much more, and what is found on the way to the other leads
+    nowhere by a step of one size: 38 in ln evidence below, of a stranger's grinding spindle."""
     lower, higher = 10.0, 48.0
 
     def each(s: float, sizes) -> np.ndarray:

@@ -28,7 +28,8 @@ def frequencies(error):
 
 
 def test_frequencies_stay_as_stated():
-    """Those of the error within modes that coincide alone; the rest would push them by a hundred times as much. Twice the error does eight times as much: the third order is left."""
+    """Those of the error within modes that coincide alone; the rest would push them by a hundred
+    times as much. Twice the error does eight times as much: the third order is left."""
     close = np.abs(np.subtract.outer(OMEGA, OMEGA)) < 0.1 * OMEGA
     off = []
     for size in (0.005, 0.01):

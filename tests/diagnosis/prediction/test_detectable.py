@@ -47,8 +47,8 @@ def test_what_is_left_at_the_smallest_size_is_worth_what_is_asked(plain):
 
 
 def test_what_is_nearly_a_tolerance_is_fitted_away(plain):
-    """A sensor on the hub beside the hub's mass, its height and its inertias, each within its tolerance, and where sensors sit: what is left of it is little, and grows with it. Steps of Gauss and Newton alone led nowhere
-    from 65 mg, and left 5000 standard errors."""
+    """A sensor on the hub beside the hub's mass, its height and its inertias, each within its tolerance, and where sensors sit: what
+    is left of it is little, and grows with it. Steps of Gauss and Newton alone led nowhere from 65 mg, and left 5000 standard errors."""
     model, done, learned, _ = plain
     sensor = next(m for m in variants(effect("sensor_mass")) if m.choices == {"turning_share": 1.0})
     assert [visibility(model.thinned, done, learned, sensor, size) for size in (0.0065, 0.065)] == pytest.approx([0.33, 3.2], rel=0.1)
@@ -63,7 +63,8 @@ def test_what_is_nearly_a_tolerance_is_fitted_away(plain):
     ids=["errors twice as large", "modes that drift by a thousandth"],
 )
 def test_beside_a_model_that_is_worse_less_shows(plain, name, worse, least, most):
-    """Errors and discrepancies are those learned, and not those that a fit starts with: what is stated of a good model is not stated of a bad one."""
+    """Errors and discrepancies are those learned, and not those that a fit starts with: what is
+    stated of a good model is not stated of a bad one."""
     model, done, learned, looked = plain
     m, size = smallest(model, done, learned, looked, 1)[name]
     known, now = (visibility(model.thinned, done, of, m, m.size.neutral + size) for of in (learned, worse(learned)))
@@ -84,8 +85,9 @@ def test_beside_a_model_that_is_worse_less_shows(plain, name, worse, least, most
     ids=["none can be built beyond 0.3", "none can be built", "the limit does not show", "what shows jumps", "nothing up to a clearance"],
 )
 def test_the_size_that_shows(limit, shown, size):
-    """Sizes with which nothing stands are too large: of a machine-tool spindle one that is no number was told. What shows at one size and not at the next is found where it jumps; a rule of three
-    alone went from one side of it to the other, and told one that was not seen."""
+    """Sizes with which nothing stands are too large: of a machine-tool spindle one that is no
+    number was told. What shows at one size and not at the next is found where it jumps; a rule of
+    three alone went from one side of it to the other, and told one that was not seen."""
     m = variants(effect("preload_loss"))[0]
     found = detectable._size_that_shows(shown, m, 0.9 * limit, limit)
     assert (found is None) == (size is None)
@@ -95,7 +97,8 @@ def test_the_size_that_shows(limit, shown, size):
 
 @pytest.mark.parametrize(("name", "drift"), [("preload_loss", 1e-3), ("clearance_opening", 0.0)])
 def test_what_shows_grows_with_the_size(plain, name, drift):
-    """What moves peaks by their widths is fitted away as far as what moves them little: these showed by 15 and 13 standard errors, where fits beside them had stalled, and 4 and 9 are left."""
+    """What moves peaks by their widths is fitted away as far as what moves them little: these
+    showed by 15 and 13 standard errors, where fits beside them had stalled, and 4 and 9 are left."""
     model, done, learned, _ = plain
     learned, m = replace(learned, sizes={**learned.sizes, kinds_of.STIFFNESS_DRIFT: drift}), variants(effect(name))[0]
     seen = [visibility(model.thinned, done, learned, m, m.size.neutral + share * (m.size.typical - m.size.neutral)) / share for share in (0.1, 0.3, 1.0)]

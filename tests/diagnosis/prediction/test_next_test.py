@@ -38,7 +38,8 @@ def test_no_test_is_proposed_where_bearings_have_lost_contact(spindle):
 
 @pytest.fixture(scope="module")
 def one_test(spindle):
-    """A campaign of one test with a lost preload, its model, and the fits of what was lost and of a rival, as a search has them before the best are settled."""
+    """A campaign of one test with a lost preload, its model, and the fits of what was lost and of a
+    rival, as a search has them before the best are settled."""
     loss = effect("preload_loss")
     campaign = mode_campaign(spindle, [TESTED], 1, [(loss, {**loss.neutral(), "loss": 0.4})], errors=drawn(spindle, 1, 1))
     model = model_of(spindle, campaign)
@@ -138,8 +139,8 @@ def predicted(shift, common):
 
 
 def test_odds_come_true():
-    """Of frequencies drawn as one of two explanations has them, with the errors that are stated: the mean of ln odds. What one thermometer and one size
-    do to nine modes is no nine times known."""
+    """Of frequencies drawn as one of two explanations has them, with the errors that are stated:
+    the mean of ln odds. What one thermometer and one size do to nine modes is no nine times known."""
     random = np.random.default_rng(0)
     thermometer, size = random.standard_normal((2, 9))
     shift = 3 * size + 0.05 * random.standard_normal(9)

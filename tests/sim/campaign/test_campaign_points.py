@@ -29,8 +29,8 @@ def test_a_foreign_campaign_is_refused_without_naming_every_segment(verb):
 
 
 def test_a_campaign_of_another_name_without_a_point_of_the_scene_is_said_to_be(spindle, capsys, tmp_path):
-    """A table of modes without shapes was compared with any machine's without a word, for it has no points; one of a copy under another name that has the scene's
-    points is its own."""
+    """A table of modes without shapes was compared with any machine's without a word, for it has no
+    points; one of a copy under another name that has the scene's points is its own."""
     measured, table = read_campaign(ROOT / "scenes" / "free_shaft" / "measured" / "modelab"), tmp_path / "table"
     [test] = measured.tests
     write_campaign(replace(measured, points=(), tests=(replace(test, modes=tuple(replace(row, shape=()) for row in test.modes)),)), table)

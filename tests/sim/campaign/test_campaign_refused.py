@@ -121,7 +121,8 @@ def test_reading_refuses(folder: Path, change: Callable[[Path], None], words: st
 
 
 def test_another_point_than_the_hammers_is_known_where_no_line_shows_power() -> None:
-    """A beam of 0.05 Hz wide modes on lines of 1 Hz, by its own measurement: told for the driving point, the answer of another passed, and its reader sought 35 minutes."""
+    """A beam of 0.05 Hz wide modes on lines of 1 Hz, by its own measurement: told for the driving
+    point, the answer of another passed, and its reader sought 35 minutes."""
     f, at = np.arange(2.0, 1000.0), np.array([63.4, 175.4, 344.6, 570.5, 851.5])
     modes = 1 / (at[:, None] ** 2 - f**2 + 2j * 5e-5 * at[:, None] * f)
     driven, signs = np.array([1.0, 0.8, 0.9, 0.7, 0.8]), np.array([1.0, -1.0, 1.0, -1.0, 1.0])
@@ -225,7 +226,8 @@ def test_low_coherence_at_antiresonances_is_accepted() -> None:
 
 @pytest.mark.parametrize(("share", "least"), [(0.01, 0.0), (0.03, 0.05), (0.06, 0.35), (0.2, 0.75)])
 def test_what_is_hardly_heard_may_be_less_coherent(share: float, least: float) -> None:
-    """An FRF that symmetry nearly forbids, a fiftieth of the strongest to a tenth: no coherence is asked below, all of it above, and no step lies between. 0.64 was refused and 0.6 taken, of the same two points."""
+    """An FRF that symmetry nearly forbids, a fiftieth of the strongest to a tenth: no coherence is asked
+    below, all of it above, and no step lies between. 0.64 was refused and 0.6 taken, of the same two points."""
     frf = rotor_frf()
     size = np.linalg.norm(frf.value[:, 0], axis=-1).max()
     value, coherence = frf.value.copy(), np.full(frf.value.shape, 0.99)

@@ -1,4 +1,5 @@
-"""Runout in campaigns: what is written reads back, other programs' files read correctly, bad files are refused by name; virtual ones are physical."""
+"""Runout in campaigns: what is written reads back, other programs' files read correctly, bad files
+are refused by name; virtual ones are physical."""
 
 from __future__ import annotations
 
@@ -173,8 +174,8 @@ def test_bad_tables_are_refused(tmp_path: Path, old: str, new: str, words: str) 
     [("hann", (0.5, -0.5), 1.5), ("flattop", (0.21557895, -0.41663158, 0.277263158, -0.083578947, 0.006947368), 3.7702)],
 )
 def test_a_sine_in_noise_has_its_amplitude_through_a_window(tmp_path: Path, window: str, terms: tuple[float, ...], bins: float) -> None:
-    """250 nm once a revolution, a third of a bin beside one, zero to peak by the coherent gain a_0; the squares of its bins add up to 1 + sum a_k^2 /
-    2 a_0^2 of its own.
+    """250 nm once a revolution, a third of a bin beside one, zero to peak by the coherent gain a_0;
+    the squares of its bins add up to 1 + sum a_k^2 / 2 a_0^2 of its own.
 
     Without a line there is no more than the standard errors say of noise."""
     spindle = load(ROOT / "scenes" / "mk7702")  # one line at all: its bearings are numbers

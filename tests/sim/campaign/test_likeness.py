@@ -92,7 +92,8 @@ def of_one(campaign: Campaign, test: int, change: Callable[[np.ndarray], np.ndar
 
 
 def test_what_is_mistaken_in_one_test_is_said_of_it(spindle, foreign):
-    """A sensor glued on the other way round between two tests, one file in g, two cables exchanged: the others are right, and all together told nothing."""
+    """A sensor glued on the other way round between two tests, one file in g, two cables exchanged:
+    the others are right, and all together told nothing."""
     order, first = np.array([0, 1, 3, 2, 4, 5, 6]), np.where(np.arange(7) == 0, -1.0, 1.0)[:, None, None]
     for k in (0, 2):
         begins = f"test {foreign.tests[k].id}: "

@@ -129,8 +129,8 @@ def test_residuals_of_shapes_have_the_scatter_that_is_told(scene) -> None:
 
 
 def test_shapes_part_modes_that_lie_beside_each_other(scene) -> None:
-    """A hub that rocks at 1821 Hz is told at 1950, what moves along the axis at 2010 is told at 1900, and of what kind they are is not: by frequencies alone they are
-    each other."""
+    """A hub that rocks at 1821 Hz is told at 1950, what moves along the axis at 2010 is told at
+    1900, and of what kind they are is not: by frequencies alone they are each other."""
     told = {1821.0: 1950.0, 2009.9: 1900.0}
     for nodes in ([p.node for p in scene.points], []):
         plain = mode_campaign(scene, CONDITIONS[:1], 1, shapes=nodes)

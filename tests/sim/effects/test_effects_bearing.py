@@ -116,8 +116,9 @@ def test_bearing_modes_move_as_declared(spindle, module, condition, axial, rocki
 
 
 def test_a_tilted_ring_moves_the_rocking_pair_apart(spindle):
-    """About x the row stiffens in tilt_y as balls away from the axis load up: the pair of the hub on its bearings parts at rest. Either way alike, and as
-    the square of the tilt while it is small; at the typical 0.2 mrad, where the least loaded balls lose more than half, faster."""
+    """About x the row stiffens in tilt_y as balls away from the axis load up: the pair of the hub
+    on its bearings parts at rest. Either way alike, and as the square of the tilt while it is
+    small; at the typical 0.2 mrad, where the least loaded balls lose more than half, faster."""
     plain = operating_point(spindle, REST, [])
 
     def parted(tilt):

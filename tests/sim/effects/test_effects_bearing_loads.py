@@ -139,7 +139,8 @@ def test_two_rings_askew_in_directions_of_their_own(spindle):
 
 
 def test_a_pull_on_a_shaft_whose_inner_rings_turn_loads_the_rows_that_hold_it():
-    """Towards -z it is borne by rows whose outer rings load them towards +z, the rear ones, and taken off the front ones: 40 N are their difference by statics."""
+    """Towards -z it is borne by rows whose outer rings load them towards +z, the rear ones, and
+    taken off the front ones: 40 N are their difference by statics."""
     mine = replace(with_tool(), sets=tuple(replace(s, spring=None) for s in with_tool().sets))
     before, after = (at(mine, REST, magnetic_pull, pull=pull, remanence_slope=0.0, radial_ratio=0.0).state for pull in (0.0, 40.0))
     carried = {sense: sum(after.bearing(b.name).preload - before.bearing(b.name).preload for b in mine.bearings if b.sense == sense) for sense in (-1, 1)}

@@ -48,8 +48,8 @@ def test_bond_against_another_program(spindle, temperature, expected):
 
 
 def test_soak_against_another_program(spindle):
-    """The pair of the hub on its bearings falls by 8.4 Hz from 20 to 60 C in a campaign whose hub rises by a quarter less, where it falls by
-    377 Hz else: two large changes that nearly cancel. Two programs agree to 4 Hz there (data sheet)."""
+    """The pair of the hub on its bearings falls by 8.4 Hz from 20 to 60 C in a campaign whose hub rises by a quarter less,
+    where it falls by 377 Hz else: two large changes that nearly cancel. Two programs agree to 4 Hz there (data sheet)."""
     lagging, plain = ([operating_point(spindle, Condition(t), e).modes[5:7] for t in (20.0, 60.0)] for e in (SOAK, ()))
     falls = [np.mean([m.frequency for m in cold]) - np.mean([m.frequency for m in hot]) for cold, hot in (lagging, plain)]
     assert falls[0] == pytest.approx(8.4, abs=4.0)

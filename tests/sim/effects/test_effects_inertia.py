@@ -139,7 +139,8 @@ def test_sensor_mass_of_one_sensor(spindle):
 
 
 def test_a_sensor_whose_mass_is_told_is_in_the_model(spindle):
-    """Of a point of the seat: the matrices of the effect with a gram at that point alone; the drawing stays what it was, and what is not told weighs nothing."""
+    """Of a point of the seat: the matrices of the effect with a gram at that point alone; the
+    drawing stays what it was, and what is not told weighs nothing."""
     told = replace(spindle, points=tuple(replace(p, mass=1e-3 if p.node == 5 else 0.0) for p in spindle.points))
     alone = replace(spindle, points=tuple(replace(p, listens=p.node == 5) for p in spindle.points))
     expected = at(alone, Condition(40.0), sensor_mass, mass=1.0, turning_share=1.0).chain
@@ -154,7 +155,8 @@ def test_a_sensor_whose_mass_is_told_is_in_the_model(spindle):
 
 
 def test_a_point_that_is_only_struck_has_no_sensor(spindle):
-    """A roving hammer: the mass of the sensors is where they are read, and not at every point of the hammer. Eight grams of two accelerometers were 32 on a housing."""
+    """A roving hammer: the mass of the sensors is where they are read, and not at every point of
+    the hammer. Eight grams of two accelerometers were 32 on a housing."""
     frf = Frf(np.array([800.0, 1200.0]), np.ones((1, 3, 2), complex), (5,), (1, 3, 6), "mobility")
     test = Test("roving", 20.0, 0.0, frf=frf)
     own = measured_at(spindle, Campaign("roving", spindle.name, "mobility", spindle.points, (test,)), test)
@@ -164,7 +166,8 @@ def test_a_point_that_is_only_struck_has_no_sensor(spindle):
 
 
 def test_balanced_sensors_leave_the_centre_of_mass(spindle):
-    """Half a gram at (12, 0, 20) mm on the hub and half its mirror image in z: the inertia of both, spread round the axis; a quarter shifts."""
+    """Half a gram at (12, 0, 20) mm on the hub and half its mirror image in z: the inertia of both,
+    spread round the axis; a quarter shifts."""
     hub, point = spindle.structure.body("hub"), spindle.point(1)
     found = loaded(hub, point, 1e-3, 0.0)
     arm = 20e-3 - hub.z

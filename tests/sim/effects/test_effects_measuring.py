@@ -98,7 +98,8 @@ def test_one_channel_alone_is_late_or_wrong(spindle):
 
 
 def test_a_channel_and_a_hammer_are_the_same_in_every_test(spindle):
-    """Tests that have sensors and hammer points in another order, or not all of them: the one that is meant is that of one node, and not of a row. The first node of each test was."""
+    """Tests that have sensors and hammer points in another order, or not all of them: the one that
+    is meant is that of one node, and not of a row. The first node of each test was."""
     frfs = [Frf(LINES, np.ones((len(nodes), len(struck), len(LINES)), complex), nodes, struck, "mobility") for nodes, struck in (((1, 2, 3), (1, 2)), ((3, 2, 1), (2, 1)), ((5, 2), (6, 2)))]
     tests = tuple(Test(f"t{k}", 20.0, 0.0, frf=frf) for k, frf in enumerate(frfs))
     campaign = Campaign("three", spindle.name, "mobility", spindle.points, tests)

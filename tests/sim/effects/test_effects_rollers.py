@@ -101,7 +101,8 @@ def test_grease_damps_rollers_alone_too(alone):
 
 
 def test_rollers_have_the_temperature_of_the_standing_ring_as_balls_do(alone):
-    """T_ball = T_ref + (1 - ball_share s) (T - T_ref): without a share of the lag rollers are as warm as the chamber, and the clearance has all of their growth."""
+    """T_ball = T_ref + (1 - ball_share s) (T - T_ref): without a share of the lag rollers are as
+    warm as the chamber, and the clearance has all of their growth."""
     values = soak_lag.EFFECT.typical() | {"ball_share": 0.0}
     same = soak_lag.EFFECT.typical() | {"ball_share": 0.5}  # the mean of both rings, as without a say of the effect
     roller, lag = alone.roller_bearings[0], 0.25 * 20.0
@@ -111,7 +112,8 @@ def test_rollers_have_the_temperature_of_the_standing_ring_as_balls_do(alone):
 
 
 def test_a_rigid_shaft_bends_between_bearings_of_any_kind():
-    """By numbers as by ball rows: the far bearing is met through the beam. It was told that its bearings stand at one height, none being looked at."""
+    """By numbers as by ball rows: the far bearing is met through the beam. It was told that its
+    bearings stand at one height, none being looked at."""
     spindle = load(ROOT / "scenes" / "hdd_2003")
     state = operating_point(spindle, Condition(20.0)).state
     numbers = tuple(

@@ -39,8 +39,8 @@ def machine_tool():
 
 @cache
 def on_trial(name):
-    """On the reference, or on a machine that has what the effect acts on: one with a flexible shaft in a housing, its beam short of shear and of half its
-    rotary inertia; or one with a tool."""
+    """On the reference, or on a machine that has what the effect acts on: one with a flexible shaft
+    in a housing, its beam short of shear and of half its rotary inertia; or one with a tool."""
     effect = by_name(name)
     return trial(effect, next(s for s in (made() for made in (reference, machine_tool, with_tool)) if refusal(effect, s) is None))
 

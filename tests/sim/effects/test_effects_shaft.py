@@ -189,7 +189,8 @@ def test_support_anisotropy_scales_a_whole_bending_plane():
 
 
 def test_a_shaft_in_series_with_a_flange_that_has_a_loss_factor_loses_nothing(spindle):
-    """K (1 + i eta) and F in series: 1 / (1 / K (1 + i eta) + F), to first order eta K_s^2 / K, less than eta K_s by the share of the strain that is the shaft's."""
+    """K (1 + i eta) and F in series: 1 / (1 / K (1 + i eta) + F), to first order eta K_s^2 / K,
+    less than eta K_s by the share of the strain that is the shaft's."""
     eta, bent = 0.02, {"scale": 5.0}
     joints = tuple(replace(j, damping_ratio=0.0, loss_factor=eta if j.role == "flange" else 0.0) for j in spindle.structure.joints)
     lossy = replace(spindle, structure=replace(spindle.structure, joints=joints))

@@ -37,8 +37,8 @@ def test_friction_heat_against_the_steady_solver(spindle):
 
 
 def test_friction_heat_of_a_fast_spindle(spindle):
-    """Found on another's machine: cold grease at speed makes more heat than its own warmth leaves it, which took the way to the answer beyond the viscosity's law; the
-    effect was then no explanation of anything. What lies beyond it at the end is refused."""
+    """Found on another's machine: cold grease at speed makes more heat than its own warmth leaves it, which took the way to the
+    answer beyond the viscosity's law; the effect was then no explanation of anything. What lies beyond it at the end is refused."""
     thermal = spindle.thermal
     still = replace(spindle, thermal=replace(thermal, sources=(), friction=replace(thermal.friction, f0=2 * thermal.friction.f0)))
     fast, unit = Condition(0.0, 30_000 * RPM), thermal_gradient.unit_rise(still)
@@ -68,8 +68,8 @@ def test_friction_heat_grows_with_speed_as_palmgren(spindle):
 
 
 def test_level_share_warms_shaft_and_inner_rings_alike(spindle):
-    """All levelled is the spindle whose shaft and inner rings are uniformly warmer than its hub, by what the mean rings differ: so are its modes.
-    Half levelled is half way. The modes do not know much of it: what bearings see is the difference of the parts."""
+    """All levelled is the spindle whose shaft and inner rings are uniformly warmer than its hub, by what the mean rings differ: so
+    are its modes. Half levelled is half way. The modes do not know much of it: what bearings see is the difference of the parts."""
     uniform = {g.name: 20.0 for g in spindle.regions}
 
     def field(level, common=0.0):

@@ -13,8 +13,8 @@ MODES = (1000.3, 1530.0, 1820.0, 2018.0, 4400.0)
 
 @pytest.mark.parametrize("shares", [(1e-3, 1.0, 1.0), (1e-2, 0.1, 1.0), (1e-4, 1e-3, 1.0)])
 def test_no_part_of_the_noise_is_lost_to_chance(shares):
-    """White noise of both channels and noise in proportion, three hits: within 40 % on the worst line of thirty tests. By squares weighted with the fit itself one test in
-    twenty lost the part in proportion, and a first mode was 10 of its standard errors off."""
+    """White noise of both channels and noise in proportion, three hits: within 40 % on the worst line of thirty tests. By squares
+    weighted with the fit itself one test in twenty lost the part in proportion, and a first mode was 10 of its standard errors off."""
     f = FREQUENCY
     gain = sum(abs(1j * f / (f0**2 - f**2 + 2e-3j * f0 * f)) ** 2 for f0 in MODES)
     terms = np.stack([np.ones_like(f), gain, gain * np.cos(np.pi * f / 12050) ** 4], axis=1)

@@ -67,8 +67,9 @@ DASHPOT = """<mujoco><option gravity="0 0 0" integrator="RK4" timestep="{step}"/
 
 
 def test_what_images_of_the_held_force_leave(spindle):
-    """A mass (and a weak dashpot) has the mobility 1 / (m s + c). Held over a step h and with the mean velocity over the same its FRF is y^3 cos y / sin^3 y times that of the
-    mass, y = pi f h: the sum of 1 / (x + k)^3 over the images k, whose leading term is -y^4 / 15. Velocity read once a step had + y^2 / 3, a hundred times as much."""
+    """A mass (and a weak dashpot) has the mobility 1 / (m s + c). Held over a step h and with the mean velocity
+    over the same its FRF is y^3 cos y / sin^3 y times that of the mass, y = pi f h: the sum of 1 / (x + k)^3 over
+    the images k, whose leading term is -y^4 / 15. Velocity read once a step had + y^2 / 3, a hundred times as much."""
     for step in (20e-6, 10e-6):
         test = replace(spindle.hammer, step=step, hits=1, hammer_nodes=(1,))
         every, steps = sampling(test)

@@ -31,13 +31,15 @@ def quick_point(name, rpm=0.0, **changes):
 
 @pytest.mark.parametrize(("scene", "rpm"), [("five_bearing", 0.0), ("five_bearing", 12000.0), ("hdd_2003", 7200.0)])
 def test_records_hold_the_exact_frfs(scene, rpm):
-    """Of the whole model, gyroscopic terms included, to some times the images of the held force: they show most where all points hardly move, and of a node's mass alone."""
+    """Of the whole model, gyroscopic terms included, to some times the images of the held force:
+    they show most where all points hardly move, and of a node's mass alone."""
     test = impact_tests([quick_point(scene, rpm)], element="reduced", noise=False)[0]
     assert error(test, exact_frf(test, test.estimate.window_decay)) < 8 * IMAGES
 
 
 def test_records_are_those_of_mujoco():
-    """At steps of 8 and 3.6 us, over which both channels are means; FRFs do not know them, at the nose neither, whose node is light: images of the held force were 2e-3 of all FRFs."""
+    """At steps of 8 and 3.6 us, over which both channels are means; FRFs do not know them, at the
+    nose neither, whose node is light: images of the held force were 2e-3 of all FRFs."""
     point = quick_point("five_bearing", record_length=0.02)
     same = replace(point.spindle.hammer, hammer_nodes=(1,))
     mujoco, small = (impact_tests([point], same, element, noise=False)[0] for element in ("linear", "reduced"))
@@ -48,8 +50,8 @@ def test_records_are_those_of_mujoco():
 
 
 def test_a_beam_too_stiff_to_step():
-    """A thin shaft without rotary inertia: MuJoCo's step would be 0.07 us. Who asks for it is told what to ask for, and who asks for nothing gets that, with its four modes: it was refused, and
-    the scene's own record showed two."""
+    """A thin shaft without rotary inertia: MuJoCo's step would be 0.07 us. Who asks for it is told what to ask for,
+    and who asks for nothing gets that, with its four modes: it was refused, and the scene's own record showed two."""
     point = quick_point("free_shaft")
     with pytest.raises(BadInput, match="--element reduced"):
         impact_tests([point], element="linear")

@@ -1,5 +1,6 @@
-"""The reference spindle as a matrix model of the data sheet's chain (`reference/hdd_2003.md`), its bearing stiffness written out from the sheet's
-numbers: nothing of `model` or `sim` but the code under test. Coordinates: base z | seat z, tilts | shaft x y z, tilts | hub x y z, tilts.
+"""The reference spindle as a matrix model of the data sheet's chain (`reference/hdd_2003.md`), its
+bearing stiffness written out from the sheet's numbers: nothing of `model` or `sim` but the code
+under test. Coordinates: base z | seat z, tilts | shaft x y z, tilts | hub x y z, tilts.
 """
 
 from __future__ import annotations

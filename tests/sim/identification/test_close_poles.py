@@ -1,4 +1,5 @@
-"""Two modes hardly apart: told where a single point tells their shapes apart, and with errors that own up to what the data leave open where they do not."""
+"""Two modes hardly apart: told where a single point tells their shapes apart, and with errors that
+own up to what the data leave open where they do not."""
 
 from __future__ import annotations
 
@@ -20,8 +21,9 @@ from thermospindle.sim.operating import operating_point
 
 @pytest.mark.parametrize(("hammers", "told"), [((1,), 6), ((1, 2), 8)], ids=["one hammer", "two"])
 def test_whirl_against_and_with_the_rotation_is_two_modes(hammers, told):
-    """At 2000 rpm the pairs of a machine-tool spindle are 0.1 to 0.9 of their half-widths apart, with shapes that a single point across the hammer tells (MAC 0.976): they were merged where it was told, with one mode
-    for two and a chi-square of 4 and of 39. What one hammer cannot tell apart, at 3097 and 3105 Hz, has errors as wide as that."""
+    """At 2000 rpm the pairs of a machine-tool spindle are 0.1 to 0.9 of their half-widths apart, with shapes that a
+    single point across the hammer tells (MAC 0.976): they were merged where it was told, with one mode for two and
+    a chi-square of 4 and of 39. What one hammer cannot tell apart, at 3097 and 3105 Hz, has errors as wide as that."""
     scene = load(ROOT / "scenes" / "mk7702")
     point = operating_point(replace(scene, hammer=replace(scene.hammer, hammer_nodes=hammers)), Condition(20.0, 2000 * RPM))
     lines = np.arange(300.0, 4000.0, 2.5)
@@ -46,7 +48,8 @@ ACROSS = np.array([1.0, 0.8, -0.5, 0.3, 0.2j])  # shape of a whirling mode at fi
 
 
 def pair_of_whirls(s, poles, hammers, noise, seed, shape=ACROSS):
-    """Mobilities at `s` of two modes with `shape` and its conjugate for shapes and `hammers` (2, n_ref) for participations, noise in parts of the largest, and its standard deviation."""
+    """Mobilities at `s` of two modes with `shape` and its conjugate for shapes and `hammers` (2,
+    n_ref) for participations, noise in parts of the largest, and its standard deviation."""
     random = np.random.default_rng(seed)
     modes = [np.multiply.outer(np.outer(z, part), 1 / (s - p)) for z, part, p in zip((shape, shape.conj()), hammers, poles, strict=True)]
     mirrored = [np.multiply.outer(np.outer(z, part), 1 / (s - p)) for z, part, p in zip((shape.conj(), shape), np.conj(hammers), np.conj(poles), strict=True)]
@@ -73,7 +76,8 @@ HAMMERS = {
 
 @pytest.mark.parametrize(("hammers", "hardly"), HAMMERS.values(), ids=HAMMERS)
 def test_a_pair_hardly_apart_is_off_by_no_more_than_its_errors(hammers, hardly):
-    """Two modes of 20 Hz half-width 2.5 Hz apart: the second moment and the middle are hardly known, errors of first order were passed by up to 39 of them, and say nothing of it where hammers excite the two alike."""
+    """Two modes of 20 Hz half-width 2.5 Hz apart: the second moment and the middle are hardly known, errors
+    of first order were passed by up to 39 of them, and say nothing of it where hammers excite the two alike."""
     lines, true = np.arange(700.0, 1301.0, 2.0), np.array([998.75, 1001.25])
     poles = 2 * np.pi * true * (-0.02 + 1j * np.sqrt(1 - 0.02**2))
     for seed in range(8):
@@ -85,7 +89,8 @@ def test_a_pair_hardly_apart_is_off_by_no_more_than_its_errors(hammers, hardly):
 
 
 def test_a_pair_of_nearly_one_shape_leaves_room_for_a_faint_mode():
-    """Whirl with shapes of a MAC of 0.98, and a mode of a hundredth of it 1.5 half-widths above: that the two were told ended the search for faint ones."""
+    """Whirl with shapes of a MAC of 0.98, and a mode of a hundredth of it 1.5 half-widths above:
+    that the two were told ended the search for faint ones."""
     s, shape, hammers = 1j * np.linspace(0.7, 1.3, 301), np.array([1.0, 0.8, -0.5, 0.3, 0.1j]), np.array([[1.0, 0.3j], [1.0, -0.3j]])
     poles = np.array([0.995, 1.005, 1.035]) * (-0.02 + 1j * np.sqrt(1 - 0.02**2))
     frf, sd = pair_of_whirls(s, poles[:2], hammers, 1e-3, 0, shape)
@@ -113,7 +118,8 @@ def test_the_second_moment_of_a_pair_has_the_error_that_is_told():
 
 
 def test_the_error_of_a_second_moment_under_an_exponential_window():
-    """Noise that falls to a tenth of itself over the record: what the fit, which takes all lines for independent, tells of t^2 exp(-b t) is 1.7 times too little. Over 60 draws."""
+    """Noise that falls to a tenth of itself over the record: what the fit, which takes all lines
+    for independent, tells of t^2 exp(-b t) is 1.7 times too little. Over 60 draws."""
     spacing, sd, pole = 0.002, 4e-5, np.array([-0.02 + 0.999j, -0.02 + 1.001j])
     decay = np.log(10.0) * spacing / (2 * np.pi)
     s = decay + 1j * spacing * np.arange(350, 651)

@@ -70,8 +70,8 @@ def test_reference_scene(rpm, step, relative):
 
 @pytest.mark.parametrize(("seeds", "within"), [(4, 0.35), pytest.param(12, 0.2, marks=pytest.mark.slow)])
 def test_standard_errors_come_true(seeds, within):
-    """Realisations in a narrower band (seven modes, one pair of them 2.4 Hz apart at 5 % damping): the squared errors in units of the stated
-    covariance are chi-square of 14 degrees of freedom each, so that with twelve errors stated 20 % wrong either way are caught."""
+    """Realisations in a narrower band (seven modes, one pair of them 2.4 Hz apart at 5 % damping): the squared errors in units of the
+    stated covariance are chi-square of 14 degrees of freedom each, so that with twelve errors stated 20 % wrong either way are caught."""
     lines = np.arange(1150.0, 6001.0, 5.0)
     exact = reference(lines)
     frequency, damping, shape = (x[1:8] for x in eigen(*spindle(), sensors()))
@@ -90,9 +90,9 @@ def test_standard_errors_come_true(seeds, within):
 
 @pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 12), marks=pytest.mark.slow)], ids=["two", "ten"])
 def test_a_pair_near_the_end_of_a_narrow_band(seeds):
-    """1650 to 5000 Hz: modes at 1002, 1545 and 5551 Hz lie outside, and the pair 2.4 Hz apart, as wide as 5 % of its frequency, near the upper end. It is
-    never told as one mode (in 5 of 12 realisations it was, before `split` left poles with free residues unrefined), and the errors cover what modes
-    outside do."""
+    """1650 to 5000 Hz: modes at 1002, 1545 and 5551 Hz lie outside, and the pair 2.4 Hz apart, as wide as
+    5 % of its frequency, near the upper end. It is never told as one mode (in 5 of 12 realisations it was,
+    before `split` left poles with free residues unrefined), and the errors cover what modes outside do."""
     lines = np.arange(1650.0, 5001.0, 5.0)
     exact = reference(lines)
     frequency, damping, _ = (x[2:7] for x in eigen(*spindle(), sensors()))
@@ -147,7 +147,8 @@ def test_noise_that_is_not_known_is_taken_from_the_lines():
 
 @pytest.mark.parametrize("damping", [0.01, 1e-4])
 def test_of_very_many_lines_those_that_tell_do(monkeypatch, damping):
-    """4000 lines where 1000 are many: all of those at a peak, however narrow, and one in four elsewhere; to the errors that all would give, nearly."""
+    """4000 lines where 1000 are many: all of those at a peak, however narrow, and one in four
+    elsewhere; to the errors that all would give, nearly."""
     lines, at = np.arange(100.0, 900.0, 0.2), np.array([310.03, 540.0])
     s = 2j * np.pi * lines
     value = sum(s / (s**2 + 2 * damping * (w := 2 * np.pi * f) * s + w**2) for f in at)[None, None]
@@ -324,7 +325,8 @@ def test_a_pair_with_nearly_the_same_frequency_stays_two():
 
 @pytest.mark.parametrize("seed", [0, 2])
 def test_faint_modes_do_not_bend_those_that_overlap(seed):
-    """Of a machine-tool spindle at 6000 rpm: modes at 1759, 1762 and 1802 Hz with 3 to 4 % of damping, beside axial ones that hardly show. Without these, which free residues are too dear for, they were off by up to 11 of their errors."""
+    """Of a machine-tool spindle at 6000 rpm: modes at 1759, 1762 and 1802 Hz with 3 to 4 % of damping, beside axial ones
+    that hardly show. Without these, which free residues are too dear for, they were off by up to 11 of their errors."""
     five = load(ROOT / "scenes" / "five_bearing")
     point = operating_point(five, Condition(20.0, 6000 * RPM))
     frequency = np.arange(*five.hammer.band, 4.0)

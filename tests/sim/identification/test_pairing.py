@@ -94,7 +94,8 @@ def test_the_cost_is_that_of_its_docstring():
 
 
 def test_as_many_as_there_are_or_none_too_dear():
-    """The same two modes, far apart: paired as numbers of a table, left alone by measured ones and by those of one model that are unlike, refused by a limit."""
+    """The same two modes, far apart: paired as numbers of a table, left alone by measured ones and
+    by those of one model that are unlike, refused by a limit."""
     a, b = known([100.0], [[1.0, 0.0]]), known([200.0], [[0.0, 1.0]])
     assert pairs(a, b, NEAREST).tolist() == [[0, 0]]
     assert pairs(a, b, MEASURED).tolist() == pairs(a, b, BY_SHAPE).tolist() == pairs(a, b, IDENTIFIED).tolist() == []
@@ -111,7 +112,8 @@ def test_axial_stays_axial():
 
 
 def test_what_moves_far_goes_by_shape():
-    """Modes that pass others on their way keep their shapes, pairs that lie close may turn in their plane, and what is like none has no partner."""
+    """Modes that pass others on their way keep their shapes, pairs that lie close may turn in their
+    plane, and what is like none has no partner."""
     a = known([100.0, 120.0, 200.0, 201.0], np.eye(5)[:4])
     turned = np.array([[1.0, 1.0], [1.0, -1.0]]) / np.sqrt(2)
     b = known([121.0, 150.0, 230.0, 230.5], np.block([[np.eye(5)[1:2]], [np.eye(5)[:1]], [np.zeros((2, 2)), turned, np.zeros((2, 1))]]))
@@ -141,7 +143,8 @@ TOO_LOW = 1 - np.array([0.011, 0.0126, 0.0133, 0.0139, 0.0146, 0.0151])
 
 
 def bar(disturbance: float, strength: ArrayLike, above: ArrayLike = ()) -> tuple[ModeSet, ModeSet]:
-    """A bar measured at three points near one end, which all its modes move alike, with a pole that is none of its, and a model of it with modes above the band."""
+    """A bar measured at three points near one end, which all its modes move alike, with a pole that
+    is none of its, and a model of it with modes above the band."""
     f, computed = np.append(BAR, disturbance), np.append(BAR * TOO_LOW, above)
     order = np.argsort(f)
     measured = ModeSet(f[order], np.ones((7, 3), complex), (), np.append(np.ones(6), strength)[order])

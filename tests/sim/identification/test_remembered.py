@@ -1,4 +1,5 @@
-"""Modes that were extracted before are the same to the last bit, and asked of nobody where anything about the question or the file is another."""
+"""Modes that were extracted before are the same to the last bit, and asked of nobody where anything
+about the question or the file is another."""
 
 from dataclasses import fields
 

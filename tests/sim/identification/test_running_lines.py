@@ -35,7 +35,8 @@ def measured(spindle, seed: int, speed: float = SPEED) -> Frf:
 
 
 def with_spikes(frf: Frf, multiples: list[int], size: float) -> Frf:
-    """The same with spikes of `size` times the largest value at multiples of the running speed, on the line and its neighbour, of random phase."""
+    """The same with spikes of `size` times the largest value at multiples of the running speed, on
+    the line and its neighbour, of random phase."""
     random, value = np.random.default_rng(0), frf.value.copy()
     for k in multiples:
         i = round((k * SPEED / (2 * np.pi) - LINES[0]) / 2.0)

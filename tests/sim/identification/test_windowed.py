@@ -20,8 +20,8 @@ def exact(s):
 
 @pytest.mark.parametrize("end", [1.0, 0.05, 0.01])
 def test_errors_come_true_under_a_window_and_noise_makes_no_modes(end):
-    """White noise in time, under the window; its level in the FRFs given exactly. Taken for independent from line to line, errors were two to three times too small, and every second
-    draw of the shortest window had modes that are none."""
+    """White noise in time, under the window; its level in the FRFs given exactly. Taken for independent from line to
+    line, errors were two to three times too small, and every second draw of the shortest window had modes that are none."""
     n = round(RATE * LENGTH)
     time, lines = np.arange(n) / RATE, np.fft.rfftfreq(n, 1 / RATE)
     use = (lines > 400) & (lines < 3000)

@@ -70,7 +70,8 @@ DIRECTIONS = {1: 3, 3: -1, 6: 3}
 
 
 def set_58(x: np.ndarray, y: np.ndarray, response: tuple[int, int], reference: tuple[int, int], function: int = 4, kinds=(18, 11, 13), labels=("Hz", "m/s", "N"), names=("NONE", "NONE"), word="NONE") -> str:
-    """An ASCII set 58 in even steps and double precision; ends as (node, direction), `kinds` and `labels` of abscissa, numerator and denominator."""
+    """An ASCII set 58 in even steps and double precision; ends as (node, direction), `kinds` and
+    `labels` of abscissa, numerator and denominator."""
     head = "title\nNONE\n17-Oct-17 13:50:13\nNONE\nNONE\n" + f"{function:5d}{0:10d}{0:5d}{0:10d}"
     head += "".join(f" {name:10}{node:10d}{direction:4d}" for name, (node, direction) in zip(names, (response, reference), strict=True)) + "\n"
     head += f"{6 if np.iscomplexobj(y) else 4:10d}{len(x):10d}{1:10d}{x[0]:13.5E}{x[1] - x[0]:13.5E}{0:13.5E}\n"

@@ -39,8 +39,8 @@ def exact(frequency, decay=0.0):
 
 
 def hit(random, doubled=False, power=0):
-    """Force (n,) of one hit of 0.6 ms at 50 ms, and the velocities (2, n) it makes, by discrete convolution with the exact impulse response;
-    accelerations for `power` 1."""
+    """Force (n,) of one hit of 0.6 ms at 50 ms, and the velocities (2, n) it makes, by discrete
+    convolution with the exact impulse response; accelerations for `power` 1."""
     n, start = round(RATE * LENGTH), round(0.05 * RATE)
     t = np.arange(n) / RATE
     width = 6e-4 * random.uniform(0.9, 1.1)

@@ -1,4 +1,5 @@
-"""Hits of raw hammer records: found, judged, averaged to FRFs that are the exact answer of the model that made them, and left out where a channel stood at its limit."""
+"""Hits of raw hammer records: found, judged, averaged to FRFs that are the exact answer of the
+model that made them, and left out where a channel stood at its limit."""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ def test_hits_are_found_judged_and_averaged(hammered, tmp_path, estimator):
 
 
 def test_hits_that_are_not_of_one_length_are_asked_about_where_the_form_can_be_answered(hammered, tmp_path):
-    """The answer was said to be open in a form that had no line for it; what is proposed is long enough for no hit to be lost, and as long as all of them are."""
+    """The answer was said to be open in a form that had no line for it; what is proposed is long
+    enough for no hit to be lost, and as long as all of them are."""
     head, *rows = (hammered / "hammer2.csv").read_text().splitlines()
     n, short = round(RATE * LENGTH), 6500
     kept = [row for k in range(6) for row in rows[k * n : k * n + short]]
@@ -58,8 +60,8 @@ def test_hits_that_are_not_of_one_length_are_asked_about_where_the_form_can_be_a
 
 
 def test_estimators_of_noisy_records():
-    """H1, H2 and Hv as Bendat & Piersol and Rocklin define them, of a response with so much noise that they differ by the coherence and its root. The
-    force ends with its pulse, so that its window cuts nothing off."""
+    """H1, H2 and Hv as Bendat & Piersol and Rocklin define them, of a response with so much noise that they
+    differ by the coherence and its root. The force ends with its pulse, so that its window cuts nothing off."""
     random, n, hits, start = np.random.default_rng(2), 4096, 12, 200
     force = np.zeros((hits, n))
     force[:, start : start + 3] = random.uniform(50, 90, (hits, 1)) * [0.6, 1.0, 0.6]
@@ -108,7 +110,8 @@ def test_a_hit_a_row_and_no_hit(tmp_path):
 
 @pytest.mark.parametrize("clipped", [1.0, 0.85])
 def test_a_hit_whose_force_was_clipped_is_told_by_the_others(tmp_path, clipped):
-    """A pulse of a few samples stands at its limit once or twice, which no extreme tells: one hit of five was, and all FRFs were 4 % too large without a word."""
+    """A pulse of a few samples stands at its limit once or twice, which no extreme tells: one hit
+    of five was, and all FRFs were 4 % too large without a word."""
     random = np.random.default_rng(7)
     force, answer = zip(*(hit(random) for _ in range(5)), strict=True)
     force = np.array(force)

@@ -90,7 +90,8 @@ def test_files_that_may_be_one_roving_test_are_said_to_be(tmp_path, names, rovin
 
 
 def test_arrays_that_are_not_needed_are_ignored_by_one_key(tmp_path):
-    """Each of ten other arrays of a .mat had to be told "ignore" by itself; `Freq_domain` and `Time_domain` are axes, and that of time not the one of FRFs."""
+    """Each of ten other arrays of a .mat had to be told "ignore" by itself; `Freq_domain` and
+    `Time_domain` are axes, and that of time not the one of FRFs."""
     others = {f"PSD_chan_{k}": np.ones(len(FREQUENCY)) for k in range(8)}
     file = tmp_path / "T20.npz"
     lists = {"response_nodes": FRF.response_nodes, "reference_nodes": FRF.reference_nodes}

@@ -95,8 +95,8 @@ def test_dampings_of_a_table_that_may_be_in_per_cent_are_asked_about(tmp_path, u
 
 
 def test_shapes_of_a_modal_analysis(tmp_path):
-    """Two sets 55: a normal mode in real numbers and an eigenvalue with a complex shape, in all directions of all nodes; the scene's points take what is along
-    theirs, and a node that is none of them is passed over."""
+    """Two sets 55: a normal mode in real numbers and an eigenvalue with a complex shape, in all directions of
+    all nodes; the scene's points take what is along theirs, and a node that is none of them is passed over."""
     scene = load(SCENE)
     nodes = np.array([*(p.node for p in scene.points), 99])
     random = np.random.default_rng(4)
@@ -129,7 +129,8 @@ def test_shapes_of_a_modal_analysis(tmp_path):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_shape_that_is_no_number_is_refused_by_its_mode(tmp_path, value):
-    """It was refused as line 2 of a file of the campaign that was being written, which nobody has; without shapes the file makes its campaign."""
+    """It was refused as line 2 of a file of the campaign that was being written, which nobody has;
+    without shapes the file makes its campaign."""
     nodes = np.array([p.node for p in load(SCENE).points])
     ones = np.ones(len(nodes))
     wrong = np.where(nodes == 2, value, 1.0)

@@ -39,7 +39,8 @@ def test_finer_lines_lose_no_mode(cold: OperatingPoint, step: float, channels: i
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("step", [4.0, 1.0, 0.25])
 def test_standard_errors_hold_what_neighbours_do_to_a_peak(cold: OperatingPoint, step: float, seed: int) -> None:
-    """One FRF's peak is moved by the flanks of other modes, which its own residual does not tell: within three standard errors of the model."""
+    """One FRF's peak is moved by the flanks of other modes, which its own residual does not tell:
+    within three standard errors of the model."""
     modes, _ = from_peaks(magnitudes(cold, step, 1, seed), 0.0)
     assert len(modes) == len(CLEAR)
     for mode, true in zip(modes, CLEAR, strict=True):
@@ -56,7 +57,8 @@ def test_noise_makes_no_modes_on_fine_lines(cold: OperatingPoint, step: float) -
 
 
 def test_a_peak_that_one_FRF_alone_shows_is_a_mode_where_no_other_is_near(cold: OperatingPoint) -> None:
-    """More FRFs show no fewer modes: one mode in all of three, another in the first alone; and one beside the first mode in one alone is left out, and named."""
+    """More FRFs show no fewer modes: one mode in all of three, another in the first alone; and one
+    beside the first mode in one alone is left out, and named."""
     lines = np.arange(400.0, 3000.0, 1.0)
 
     def single(f0: float, damping: float = 0.01) -> np.ndarray:

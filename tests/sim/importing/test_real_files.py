@@ -28,7 +28,8 @@ def questions(*files) -> str:
 
 
 def test_receptance_with_the_unit_of_a_mobility_is_said_and_settled_by_one_key(tmp_path):
-    """Its label says Receptance, its unit (m/s)/N. Zeros fill its last line beyond the 1600 values of its header; coherence in a file beside it."""
+    """Its label says Receptance, its unit (m/s)/N. Zeros fill its last line beyond the 1600 values
+    of its header; coherence in a file beside it."""
     files = [UFF / "dataset58_FRF.unv", UFF / "dataset58_coh.unv"]
     asked = questions(*files)
     assert "'Receptance' is that of a receptance, its unit '(m/s)/N' that of a mobility" in asked
@@ -109,7 +110,8 @@ def _only(folder, head):
 
 
 def test_a_lone_column_of_complex_numbers(tmp_path):
-    """pyuff's beam: complex numbers in brackets and no frequencies; step and points are told. The sensor was at none of the first three points, as its FRFs show."""
+    """pyuff's beam: complex numbers in brackets and no frequencies; step and points are told. The
+    sensor was at none of the first three points, as its FRFs show."""
     files = sorted((PYUFF / "beam_frf").glob("*.txt"))
     assert "step_Hz" in questions(*files)
     points = "".join(

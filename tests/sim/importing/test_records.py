@@ -67,7 +67,8 @@ def test_a_sensor_that_looks_the_other_way_is_turned(hammered, tmp_path, heading
 
 
 def test_a_reference_of_the_mapping_turns_the_one_of_the_heading_and_is_no_other(hammered, tmp_path):
-    """A force sensor that reads pressure as negative; and a point that no heading tells is refused, where it was not used before, without a word."""
+    """A force sensor that reads pressure as negative; and a point that no heading tells is refused,
+    where it was not used before, without a word."""
     rows = np.loadtxt(hammered / "hammer1.csv", delimiter=",", skiprows=1)
     rows[:, 1] *= -1
     np.savetxt(tmp_path / "hammer1.csv", rows, delimiter=",", header="Time [s],force 1 [N],velocity 1 [mm/s],velocity 2 [mm/s]", comments="", fmt="%.9g")
@@ -106,8 +107,8 @@ def test_time_records_of_a_uff_file(tmp_path):
 
 @pytest.mark.parametrize(("of_force", "of_answer", "struck"), [(-1, -1, "1"), (1, -1, "1"), (-1, 1, "1"), (-1, 1, "1:-Z")])
 def test_signs_are_kept(tmp_path, of_force, of_answer, struck):
-    """A blow in the other direction, recorded so, is the same FRF; one sign of the two alone is another, unless the reference says so, and a negative force is told. It was turned, silently, and
-    its answer not."""
+    """A blow in the other direction, recorded so, is the same FRF; one sign of the two alone is another,
+    unless the reference says so, and a negative force is told. It was turned, silently, and its answer not."""
     random = np.random.default_rng(5)
     force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
     np.savez(tmp_path / "hammer1.npz", fs=RATE, force=of_force * np.array(force), velocity2=of_answer * np.array(answer)[:, 1, 0])
@@ -173,7 +174,8 @@ def test_what_records_leave_open_is_asked_at_once(tmp_path):
 
 
 def test_offset_and_drift_of_accelerometers_are_taken_out_and_said(tmp_path):
-    """A charge amplifier that wanders by a third of the largest value of both channels, 71 % of its own over the record, not about zero; without that the FRFs are 4 % off."""
+    """A charge amplifier that wanders by a third of the largest value of both channels, 71 % of its
+    own over the record, not about zero; without that the FRFs are 4 % off."""
     random = np.random.default_rng(5)
     force, answer = zip(*(hit(random, power=1) for _ in range(4)), strict=True)
     motion = np.array(answer)[:, :, 0]
@@ -230,7 +232,8 @@ def test_all_channels_in_one_array(tmp_path, order):
 
 
 def test_where_one_point_needs_a_window_all_of_a_test_have_it(tmp_path):
-    """Records of a third of a second of a slow mode, which still ring, and of a point that moves with a fast one alone, which do not: the window's damping is in the FRFs of both. They were made without it, and told to have it."""
+    """Records of a third of a second of a slow mode, which still ring, and of a point that moves with a fast one
+    alone, which do not: the window's damping is in the FRFs of both. They were made without it, and told to have it."""
     random, n = np.random.default_rng(8), round(0.35 * RATE)
     force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
     slow, fast = np.array(answer)[:, :, 0, :n], (np.array(answer)[:, :, 1] - 0.7 * np.array(answer)[:, :, 0])[..., :n]
@@ -255,7 +258,8 @@ def test_where_one_point_needs_a_window_all_of_a_test_have_it(tmp_path):
 
 @pytest.mark.parametrize(("shift", "asked"), [(1, False), (25, False), (2500, True)])
 def test_hits_that_begin_a_little_later_at_one_point_have_the_lines_of_the_others(tmp_path, shift, asked):
-    """A file a hammer point, of records equally long, in one of which the trigger came later: it was refused for lines that were another, and told to be a test of its own. Where hits would lose much of their length it is asked."""
+    """A file a hammer point, of records equally long, in one of which the trigger came later: it was refused for
+    lines that were another, and told to be a test of its own. Where hits would lose much of their length it is asked."""
     random = np.random.default_rng(9)
     force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
     for q in (1, 2):
@@ -279,8 +283,8 @@ def test_hits_that_begin_a_little_later_at_one_point_have_the_lines_of_the_other
 
 
 def test_a_window_is_for_what_rings_and_not_for_noise():
-    """A response that has died away to the noise of its sensor, 0.05 % of its peak, needs none; one that still rings does, as loud as that noise or three times softer, and so does a dead one with a short tail
-    of which nobody can tell."""
+    """A response that has died away to the noise of its sensor, 0.05 % of its peak, needs none; one that still rings
+    does, as loud as that noise or three times softer, and so does a dead one with a short tail of which nobody can tell."""
     random, n = np.random.default_rng(6), 16384
     t = np.arange(n) / 8192
     noise = 5e-4 * random.standard_normal((1, 4, 3, n))
@@ -294,7 +298,8 @@ def test_a_window_is_for_what_rings_and_not_for_noise():
 
 @pytest.mark.parametrize("tone", [0.0, 2e-3, 0.05])
 def test_a_window_is_not_for_tones_that_stay(tone):
-    """Unbalance of a running spindle is as loud at the end of a record as in its middle: it had windows put on what had died away. One is put on where a mode still rings beside it."""
+    """Unbalance of a running spindle is as loud at the end of a record as in its middle: it had
+    windows put on what had died away. One is put on where a mode still rings beside it."""
     random, n = np.random.default_rng(6), 16384
     t = np.arange(n) / 8192
     phases = 2 * np.pi * random.random((1, 4, 1, 1))

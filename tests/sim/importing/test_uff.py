@@ -1,4 +1,5 @@
-"""What a UFF file says of its axes, units and ends is used, each part alone, or refused in one sentence; FRFs are the rotor's own, written by hand."""
+"""What a UFF file says of its axes, units and ends is used, each part alone, or refused in one
+sentence; FRFs are the rotor's own, written by hand."""
 
 from __future__ import annotations
 

@@ -84,7 +84,8 @@ def test_time_in_milliseconds_and_in_what_is_not_known(tmp_path):
 
 
 def test_what_a_record_is_can_be_told(tmp_path):
-    """Of a unit that is none, and of force and response in each other's place, it was asked for `columns`, which a UFF file had none of. One set tells for all hits of its channel."""
+    """Of a unit that is none, and of force and response in each other's place, it was asked for
+    `columns`, which a UFF file had none of. One set tells for all hits of its channel."""
     random = np.random.default_rng(4)
     text = records(random, 1, (1, 3)).replace("mm/s", "V   ")
     with pytest.raises(Unanswered, match=r"columns: the unit of its response 'set 2', as in \"response 3 \[m/s\^2\]\"; found is 'V'"):

@@ -20,7 +20,8 @@ def found(spindle):
 
 @pytest.fixture(scope="session")
 def light(spindle):
-    """The reference under a quarter of its preload: warm, little of it is left, and its modes fall through lines that the reference's never meet."""
+    """The reference under a quarter of its preload: warm, little of it is left, and its modes fall
+    through lines that the reference's never meet."""
     return told_preload(spindle, 4.2)
 
 

@@ -127,7 +127,8 @@ def test_where_all_runout_repeats_a_sentence_stands_for_its_figure(met):
 
 
 def test_runout_over_speed_begins_where_the_spindle_turns(found):
-    """At rest there is none, and at the slowest speed it is that of balls that pass waves: a ramp was drawn from 0 to it, which is not there."""
+    """At rest there is none, and at the slowest speed it is that of balls that pass waves: a ramp
+    was drawn from 0 to it, which is not there."""
     assert found.nrro_speed[0].tolist() == [0.0, 0.0, 0.0]
     drawn = figures(found)["nrro"].axes[1].lines[0].get_xydata()
     assert drawn[0] == pytest.approx(found.nrro_speed[1, :2] * [1 / RPM, 1e9])
@@ -184,7 +185,8 @@ SEEN = {
 
 @pytest.mark.parametrize("seen", SEEN)
 def test_modes_and_causes_differ_in_colour(seen):
-    """By 15 in CIE Lab, where 2 can just be seen; the green of axial modes was that of ball waviness, the purple of mixed whirl that of outer waviness."""
+    """By 15 in CIE Lab, where 2 can just be seen; the green of axial modes was that of ball
+    waviness, the purple of mixed whirl that of outer waviness."""
     to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]) / np.array([[0.9505], [1.0], [1.089]])
 
     def lab(paint):

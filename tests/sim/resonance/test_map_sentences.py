@@ -1,4 +1,5 @@
-"""What a map says: what was mapped and crossed, lines that repeat every revolution, one line in several bearings, and places of its grid that are one."""
+"""What a map says: what was mapped and crossed, lines that repeat every revolution, one line in
+several bearings, and places of its grid that are one."""
 
 from __future__ import annotations
 
@@ -88,7 +89,8 @@ def test_a_shaft_that_its_own_rotation_tears_is_doubted():
 
 
 def test_what_is_met_just_beyond_the_speeds_asked_for_is_told(spindle):
-    """20 (fo-fc) meets the axial mode at 7147 rpm: beyond 6900 rpm it is told as within a tenth, beyond 6000 it is not, and within them it is a coincidence."""
+    """20 (fo-fc) meets the axial mode at 7147 rpm: beyond 6900 rpm it is told as within a tenth,
+    beyond 6000 it is not, and within them it is a coincidence."""
     nominal = Condition(20.0, 6000 * RPM)
 
     def found(highest: float) -> ResonanceMap:

@@ -121,9 +121,10 @@ def test_axial_lines_leave_rocking_modes_alone(found):
 
 
 def test_sense_of_a_nearly_standing_mode(spindle):
-    """The base holds the two rocking modes d = 26 Hz apart, turning drives them to s: of a mode's force the share (1 + sqrt(1 - d^2/s^2)) / 2 whirls
-    with it, the rest against it (two coupled oscillators, Genta 2005, sec. 2.4). Slowly turning, lines of either sense excite both. So at the upper
-    bearing, far from where the modes pivot; at the lower one the hub moves not quite alike about x and y."""
+    """The base holds the two rocking modes d = 26 Hz apart, turning drives them to s: of a mode's force
+    the share (1 + sqrt(1 - d^2/s^2)) / 2 whirls with it, the rest against it (two coupled oscillators,
+    Genta 2005, sec. 2.4). Slowly turning, lines of either sense excite both. So at the upper bearing,
+    far from where the modes pivot; at the lower one the hub moves not quite alike about x and y."""
     slow = resonance_map(spindle, [20.0, 25.0], np.linspace(0, 3600, 7) * RPM, Condition(20.0, 1800 * RPM), multiples=8)
     standing = [c for c in slow.coincidences if c.mode.number in (3, 4) and c.line.bearing == "upper"]
     assert {(c.mode.number, c.line.whirl) for c in standing} == {(3, 1), (3, -1), (4, 1), (4, -1)}
@@ -151,11 +152,11 @@ def test_grids_that_make_no_map(spindle):
 
 @pytest.mark.slow
 def test_runout_grows_when_simulated(light, met):
-    """MuJoCo's time domain at the nominal condition and at the crossing shows what the linear model says of the same record, and that grows as the
-    map tells.
+    """MuJoCo's time domain at the nominal condition and at the crossing shows what the linear model
+    says of the same record, and that grows as the map tells.
 
-    The map adds the two bearings' lines as squares, which is the mean over all places of the cages. In one record they stand somewhere: where two
-    bearings at one temperature have lines at one frequency, these beat for far longer than the record.
+    The map adds the two bearings' lines as squares, which is the mean over all places of the cages. In one record they stand
+    somewhere: where two bearings at one temperature have lines at one frequency, these beat for far longer than the record.
     """
     c = next(c for c in met.coincidences if c.at_nominal_speed)
     seen = []
@@ -169,8 +170,9 @@ def test_runout_grows_when_simulated(light, met):
 
 
 def test_map_takes_the_mean_over_the_places_of_the_cages(spindle):
-    """At 6050 rpm and 20 C, 30 fc of both bearings is one frequency near the backward rocking mode. Where one cage stands against the other turns the
-    phases of its lines: the mean square over all of that is the map's, and one place can differ from it by more than a tenth."""
+    """At 6050 rpm and 20 C, 30 fc of both bearings is one frequency near the backward rocking mode.
+    Where one cage stands against the other turns the phases of its lines: the mean square over all
+    of that is the map's, and one place can differ from it by more than a tenth."""
     point = operating_point(spindle, Condition(20.0, 6050 * RPM))
     forces, turning = harmonics(point), 6050 / 60
     seen = response(point, forces) @ np.array([p.row(point.chain) for p in hub_probes(spindle)[:2]]).T
@@ -187,7 +189,8 @@ def test_map_takes_the_mean_over_the_places_of_the_cages(spindle):
 
 
 def test_few_speeds_are_followed_as_many_are():
-    """Modes of a grinding spindle at rest and at 60,000 rpm alone: axial ones fall past others, with which they changed places by frequency."""
+    """Modes of a grinding spindle at rest and at 60,000 rpm alone: axial ones fall past others,
+    with which they changed places by frequency."""
     grinding, told = load(SCENE.parent / "templates" / "grinding.toml"), []
     for count in (2, 21):
         grid = Grid(grinding, Condition(22.0), 1, grinding.hammer.band[1], Imperfections(unbalance=1e-9))

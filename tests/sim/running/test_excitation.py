@@ -33,7 +33,8 @@ def dofs(point: OperatingPoint, body: str, moves: Sequence[str] = ("x", "y", "z"
 
 @pytest.mark.parametrize("temperature", [20.0, 60.0])
 def test_an_eccentric_race_moves_the_hub_by_itself(spindle, temperature):
-    """Order 1 of both outer races (crest at azimuth -0.6), as slow as can be: the hub's centre stands opposite to the eccentricity and nothing else moves."""
+    """Order 1 of both outer races (crest at azimuth -0.6), as slow as can be: the hub's centre
+    stands opposite to the eccentricity and nothing else moves."""
     point = at(spindle, both(outer_radial=(Wave(1, 1e-7, 0.6),)), temperature, speed=1e-3)
     forces = harmonics(point)
     assert [x.name for x in forces.line] == ["fo", "fo"]

@@ -1,4 +1,5 @@
-"""What rollers excite: every roller put where it stands at a moment, pressed by the waves that it meets there, and the ring let go where it balances."""
+"""What rollers excite: every roller put where it stands at a moment, pressed by the waves that it
+meets there, and the ring let go where it balances."""
 
 import numpy as np
 import pytest
@@ -98,7 +99,8 @@ def test_what_cancels_makes_no_line(tail, state, running):
 
 @pytest.mark.slow
 def test_a_run_of_the_tailstock_has_the_lines_of_its_rollers(running):
-    """25 turns a second: the cage at (1 - 9/91) / 2 of them, rollers past the inner race (1 + 9/91) / 2 times 26; nothing of theirs along the axis."""
+    """25 turns a second: the cage at (1 - 9/91) / 2 of them, rollers past the inner race (1 + 9/91)
+    / 2 times 26; nothing of theirs along the axis."""
     cage = 25 * (1 - 9 / 91) / 2
     own = [line for line in harmonics(running).line if line.bearing == "front1"]
     assert {line.cause for line in own} == {"inner waviness", "outer waviness", "ball waviness", "ball size"}

@@ -1,4 +1,5 @@
-"""Repeatable is what repeats every revolution of the part that a probe sees: a geared part moves as one without gears that turns as fast, and is told the same."""
+"""Repeatable is what repeats every revolution of the part that a probe sees: a geared part moves as
+one without gears that turns as fast, and is told the same."""
 
 import json
 from dataclasses import replace
@@ -91,7 +92,8 @@ def test_what_is_written_says_whose_revolutions_and_whose_orders(imperfect, dire
 
 @pytest.fixture
 def made(tmp_path):
-    """A shaft, at which the hub's probes look, a sleeve about it at -0.5 of its speed, and a bearing between them; an unbalance on one of them."""
+    """A shaft, at which the hub's probes look, a sleeve about it at -0.5 of its speed, and a
+    bearing between them; an unbalance on one of them."""
 
     def scene(part, ratio=1.0):
         text = TEXT.format(z=220.0, part=f'unbalance_body = "{part}"', element=40.0, unbalance=5.0, load="")
@@ -105,7 +107,8 @@ def made(tmp_path):
 
 
 def test_every_probe_goes_by_the_part_that_it_sees(made, tmp_path):
-    """The sleeve's unbalance repeats for the sleeve at every revolution, for the shaft at every other one; the shaft's repeats for both, twice in one of the sleeve's."""
+    """The sleeve's unbalance repeats for the sleeve at every revolution, for the shaft at every
+    other one; the shaft's repeats for both, twice in one of the sleeve's."""
     point = operating_point(made("sleeve"), Condition(20.0, 6000 * RPM))
     first = runout(point, 0.5, path="linear")
     rounded = analyse(point, replace(first.signals, angle=first.signals.angle * (1 + 1e-8)))  # as a simulation holds its speed
@@ -162,7 +165,8 @@ def test_where_a_line_of_a_map_repeats_it_is_left_out_of_nrro(made, part, ratio,
 
 
 def test_of_a_slow_part_some_multiples_are_looked_for_and_those_of_theory():
-    """A part at a thousandth of the spindle's speed has no ten thousand lines; one of theory at its 1500th multiple, but for rounding, repeats."""
+    """A part at a thousandth of the spindle's speed has no ten thousand lines; one of theory at its
+    1500th multiple, but for rounding, repeats."""
     time = np.arange(40000) / 10000
     known = [Line("", "unbalance", 0, "1x", "radial", 1, f) for f in (1.0, 1500.0 * (1 + 1e-9), 1500.5)]
     size = np.array([[1.0, -1.0j, 0.0], [0.5, -0.5j, 0.0], [0.25, -0.25j, 0.0]])
