@@ -17,7 +17,8 @@ from scipy.optimize import least_squares
 
 from thermospindle.diagnosis.data.window import Window, apart
 from thermospindle.model.built.tolerance import Toleranced
-from thermospindle.model.machine import Condition, HammerTest, Spindle
+from thermospindle.model.drawing.measuring import HammerTest
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.identification.frf import POWER, Frf, record_length
 from thermospindle.sim.operating import operating_point

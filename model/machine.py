@@ -1,13 +1,13 @@
 """What a spindle is: frozen definitions in SI units, made by `model.scene.reading.load`.
 
 Temperatures are in degrees Celsius (only differences enter the physics), angles in radians, everything else SI. What a bearing, a material
-and a structure is stands in `model.bearing.definitions`, `model.material` and `model.structure`.
+and a structure is stands in `model.bearing.definitions`, `model.material` and `model.structure`, the rest of a drawing in `model.drawing`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,135 +16,16 @@ import numpy as np
 
 from thermospindle.model.bearing.definitions import Bearing, BearingSet, LinearBearing, RollerBearing
 from thermospindle.model.built.imperfections import Imperfections
+from thermospindle.model.drawing.heating import Thermal
+from thermospindle.model.drawing.measuring import HammerTest, Point, Tolerances
+from thermospindle.model.drawing.section import Region
 from thermospindle.model.errors import BadInput, named
-from thermospindle.model.material import Material, Viscosity
+from thermospindle.model.material import Material
 from thermospindle.model.structure import Body, Structure
 
-PARTS = ("stationary", "rotating")
 RACEWAY_WIDTH = 1.9
 """Largest width of a bearing over its ball diameter where none is told and rings share a tube: 1.7
 to 2.1 in series 70, 719 and miniature ones."""
-
-
-@dataclass(frozen=True)
-class Region:
-    """A ring of rectangular section, r0 <= r <= r1, z0 <= z <= z1 (m); later regions of a part cut earlier ones."""
-
-    name: str
-    part: str  # one of PARTS
-    material: str
-    r: tuple[float, float]
-    z: tuple[float, float]
-    role: str = ""  # shaft, hub, insert or support: what effects know it by; empty for none of these
-
-    @cached_property
-    def outline(self) -> Region:
-        """Itself without a material and a role: spindles whose outlines are equal have the same sections."""
-        return replace(self, material="", role="")
-
-
-@dataclass(frozen=True)
-class Point:
-    """A measuring point; `direction` is a unit vector along an axis. `mass` (kg) is that of a sensor on it that the model
-    is to carry, and `listens` whether there is a sensor at all, and it is not only struck. `channel` and `hammer` number
-    the sensors and the hammer points of all tests of a campaign, from 1; 0 where its place among those of its spindle does."""
-
-    node: int
-    name: str
-    body: str
-    position: tuple[float, float, float]
-    direction: tuple[float, float, float]
-    mass: float = 0.0
-    listens: bool = True
-    channel: int = 0
-    hammer: int = 0
-
-    @property
-    def axis(self) -> str:
-        """Its direction as +X, -Y ..."""
-        along = max(range(3), key=lambda i: abs(self.direction[i]))
-        return ("+" if self.direction[along] > 0 else "-") + "XYZ"[along]
-
-
-FAINTEST = 1e-6  # N, peak force of a hammer: squares of far fainter ones are no numbers any more
-
-
-@dataclass(frozen=True)
-class HammerTest:
-    """The virtual impact test: hammer, vibrometer, acquisition and windows."""
-
-    hammer_nodes: tuple[int, ...]
-    tip_stiffness: float  # N/m
-    hammer_mass: float  # kg
-    level: float  # N, peak force
-    level_scatter: float  # relative, hit to hit
-    hits: int
-    double_hit_probability: float
-    sample_rate: float  # Hz
-    record_length: float  # s
-    exponential_end: float  # value of the exponential window at the end of the record; 1 is no window
-    band: tuple[float, float]  # Hz
-    noise_of_value: float  # relative FRF noise per line
-    noise_of_largest: float  # of the largest response to that hammer
-    step: float  # s, integration step
-
-
-@dataclass(frozen=True)
-class Convection:
-    """Convection on the exposed faces of `regions`, to the chamber air, or to a coolant at a temperature of its own."""
-
-    regions: tuple[str, ...]
-    coefficient: float  # W/(m2 K)
-    coolant: float | None = None  # C
-
-
-@dataclass(frozen=True)
-class HeatSource:
-    """Heat made in the volume of `regions` while turning; scales with (speed / `speed`) ** `exponent`."""
-
-    name: str
-    regions: tuple[str, ...]
-    power: float  # W at `speed`
-    speed: float  # rad/s
-    exponent: float
-
-
-@dataclass(frozen=True)
-class AirGap:
-    """Heat conductance between two facing regions of different parts, over the facing area of the first."""
-
-    regions: tuple[str, str]
-    coefficient: float  # W/(m2 K)
-
-
-@dataclass(frozen=True)
-class Friction:
-    """Palmgren's bearing friction torque M0 + M1 and the conductance through one bearing (Harris, Rolling Bearing Analysis)."""
-
-    f0: float
-    f1: float
-    viscosity: Viscosity  # kinematic, m2/s
-    conductance: float  # W/K through one bearing
-
-
-@dataclass(frozen=True)
-class Thermal:
-    convections: tuple[Convection, ...]
-    sources: tuple[HeatSource, ...]
-    gaps: tuple[AirGap, ...]
-    friction: Friction
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """One standard deviation of every build and measuring uncertainty, relative unless said."""
-
-    structure: float
-    hub: float
-    preload: float
-    damping: float
-    temperature: float  # K
-    gain: float
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from thermospindle.model.machine import Point, Spindle, kept
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Spindle, kept
 from thermospindle.model.structure import Body, with_mass
 
 

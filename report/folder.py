@@ -74,13 +74,13 @@ def _refuse_foreign_now(path: Path) -> None:
                 raise
 
 
-def _identity(path: Path) -> tuple[int, int] | None:
-    """What stands at a path, whatever it holds; None where nothing does."""
+def _identity(path: Path) -> tuple[int, int, int] | None:
+    """What stands at a path, whatever it holds; None where nothing does. A number of an inode is soon given to another."""
     try:
         found = path.stat()
     except OSError:
         return None
-    return found.st_dev, found.st_ino
+    return found.st_dev, found.st_ino, found.st_ctime_ns
 
 
 def _refuse_foreign(path: Path) -> None:

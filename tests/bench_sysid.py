@@ -25,7 +25,8 @@ from mujoco import sysid
 
 from thermospindle.diagnosis.line_fit import fit_lines
 from thermospindle.model.built.tolerance import Toleranced, toleranced
-from thermospindle.model.machine import Condition, HammerTest, Spindle
+from thermospindle.model.drawing.measuring import HammerTest
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.model.types import Array
 from thermospindle.sim.hammer.test import ImpactTest, estimate_of, impact_tests, loaded_state, sampling

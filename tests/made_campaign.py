@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from thermospindle.model.machine import Point
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.campaign.modes import ModeRow

@@ -17,7 +17,9 @@ from scipy.sparse import block_diag, coo_array, csr_array, diags_array
 from skfem import Basis, BilinearForm, FacetBasis, LinearForm
 from skfem.helpers import dot, grad
 
-from thermospindle.model.machine import AirGap, Bearing, Region, RollerBearing, Spindle
+from thermospindle.model.drawing.heating import AirGap
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Bearing, RollerBearing, Spindle
 from thermospindle.thermal import influence
 from thermospindle.thermal.mesh import PartMesh, element
 from thermospindle.thermal.temperature import TemperatureField

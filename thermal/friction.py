@@ -15,7 +15,8 @@ import scipy
 
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.bearing.roller import roller_state
-from thermospindle.model.machine import Bearing, Friction, RollerBearing, Spindle
+from thermospindle.model.drawing.heating import Friction
+from thermospindle.model.machine import Bearing, RollerBearing, Spindle
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 

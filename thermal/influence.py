@@ -14,7 +14,8 @@ from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
-from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle, kept
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Bearing, RollerBearing, Spindle, kept
 from thermospindle.model.material import Law
 from thermospindle.thermal import store
 from thermospindle.thermal.elastic import Elasticity, Race, Response

@@ -14,7 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from skfem import ElementQuadS2, ElementTriP2, Mesh, MeshQuad, MeshTri
 from skfem.element import Element
 
-from thermospindle.model.machine import Region, Spindle
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.section import cells
 
 

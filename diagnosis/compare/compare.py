@@ -19,7 +19,8 @@ from thermospindle.diagnosis.data.observe import Observation, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, by_hammer, crossings, group, numbered, partners, shapes
 from thermospindle.diagnosis.prediction.temperature import temperature_slope, whitened, with_temperature
-from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import beside, check_points, measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Test

@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.points import Applied
 from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.changed import changed
-from thermospindle.model.machine import Point
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.rotor.chain import Layout, row_of
 from thermospindle.model.types import Array, Integers
 from thermospindle.sim.effects.effect import Measurement

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from thermospindle.diagnosis.runout.lines import Seen, UnexplainedLine, key_of, look, runout_tests
 from thermospindle.diagnosis.runout.sources import phasors, scatter
 from thermospindle.model.bearing.kinematics import Line
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import on_nodes
 from thermospindle.sim.campaign.campaign import Campaign, Test

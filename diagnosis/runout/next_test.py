@@ -18,8 +18,9 @@ from thermospindle.diagnosis.runout.fit import Family, families
 from thermospindle.diagnosis.runout.held_out import amplitude_of, by_group, each_line, scattered, squares
 from thermospindle.diagnosis.runout.lines import FORM, Seen, expected
 from thermospindle.diagnosis.runout.sources import sources
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import NoEquilibrium, NotConverged, OutsideRange
-from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.effect import called

@@ -19,7 +19,8 @@ from thermospindle.model.built.drawn import GRADES, held_over
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.carrier import named, permissible_unbalance, unbalanced
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import on_nodes

@@ -15,7 +15,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.loss import damping_of_loss
 from thermospindle.model.structure import MOVES, Body, Joint, Structure
 from thermospindle.model.types import Array, Integers

@@ -11,7 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Layout, Matrices, RotorBase, row_of
 from thermospindle.model.rotor.poles import LARGE, Between, poles
 from thermospindle.model.rotor.reduced import reduced

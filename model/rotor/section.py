@@ -8,7 +8,8 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from thermospindle.model.machine import Material, Region
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Material
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ import numpy as np
 import scipy
 
 from thermospindle.model.bearing.state import ALIKE
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase, element_rows, matrices, point_row
 from thermospindle.model.types import Array
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.bearing.row import contact_constants, reference_motion, ring_speeds
+from thermospindle.model.drawing.section import Region
 from thermospindle.model.errors import BadInput, instead
-from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
+from thermospindle.model.machine import Bearing, RollerBearing, Spindle
 from thermospindle.model.rotor.section import cells
 from thermospindle.model.shaft import SAME_HEIGHT
 

@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from thermospindle.model import machine as m
 from thermospindle.model.bearing.definitions import SENSE
 from thermospindle.model.built.tolerance import LEAST, MOST
+from thermospindle.model.drawing import measuring as drawn
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, SCENE
 from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, BearingSet, Mounted, RollerRow, check_sets
@@ -57,8 +58,8 @@ class Tolerances(Table):
     temperature_K: Positive = 0.2
     gain: Positive = 0.01
 
-    def tolerances(self) -> m.Tolerances:
-        return m.Tolerances(
+    def tolerances(self) -> drawn.Tolerances:
+        return drawn.Tolerances(
             structure=self.structure,
             hub=self.hub,
             preload=self.preload,

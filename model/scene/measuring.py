@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, model_validator
 
-from thermospindle.model import machine as m
+from thermospindle.model.drawing import measuring as m
 from thermospindle.model.scene.fields import Band, NotNegative, Once, OneLine, Position, Positive, Share, Table
 from thermospindle.model.units import MM
 

@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from thermospindle.model import machine as m
+from thermospindle.model import material as drawn
+from thermospindle.model.drawing import section as m
 from thermospindle.model.errors import instead
 from thermospindle.model.scene.fields import LawValue, Name, Radii, Span, Table, values_within
 from thermospindle.model.units import MM
@@ -25,8 +26,8 @@ class Material(Table):
     conductivity_W_per_m_K: Annotated[float, Field(ge=1e-3, le=1e4)]
     heat_capacity_J_per_kg_K: Annotated[float, Field(ge=1, le=1e5)]
 
-    def material(self, name: str) -> m.Material:
-        return m.Material(
+    def material(self, name: str) -> drawn.Material:
+        return drawn.Material(
             name=name,
             youngs_modulus=self.youngs_modulus_GPa.law(1e9, f"materials.{name}.youngs_modulus_GPa"),
             poisson_ratio=self.poisson_ratio,

@@ -7,7 +7,8 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from thermospindle.model import machine as m
+from thermospindle.model.drawing import heating as m
+from thermospindle.model.drawing.section import Region
 from thermospindle.model.material import LEAST_VISCOSITY, Viscosity
 from thermospindle.model.scene.fields import LawTable, LawValue, Name, NotNegative, Positive, Table, Temperature, TwoNames
 from thermospindle.model.units import RPM
@@ -67,7 +68,7 @@ class Thermal(Table):
     gaps: list[Gap] = Field(default_factory=list)
     friction: Friction = Friction()
 
-    def thermal(self, regions: Sequence[m.Region]) -> m.Thermal:
+    def thermal(self, regions: Sequence[Region]) -> m.Thermal:
         """`regions` are those of the section, cooled as assumed where no convection is told."""
         f = self.friction
         told = tuple(m.Convection(regions=tuple(c.regions), coefficient=c.coefficient_W_per_m2_K, coolant=c.coolant_temperature_C) for c in self.convection)

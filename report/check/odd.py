@@ -8,8 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.model.carrier import UNBALANCE, load_carrier, turning_parts, unbalanced
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.drawing.section import PARTS
 from thermospindle.model.errors import listed
-from thermospindle.model.machine import PARTS, Point, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.poles import LARGE, lost_to_rounding, poles_below
 from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.rotor.static import free_motions

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
-from thermospindle.model.machine import PARTS, RollerBearing, Spindle
+from thermospindle.model.drawing.section import PARTS
+from thermospindle.model.machine import RollerBearing, Spindle
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import BEARINGS, INK, PALE, STYLE, colour, least_span, svg
 from thermospindle.sim.operating import OperatingPoint

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.model.drawing.measuring import FAINTEST
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.stiffness_table import STEPS
-from thermospindle.model.machine import FAINTEST, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.elements import BALLS, LINEAR
 from thermospindle.report.folder import check_folder, mark, whole_folder
 from thermospindle.sim.effects.effect import Effect

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermospindle.model.machine import PARTS, Spindle
+from thermospindle.model.drawing.section import PARTS
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.model.rotor.look.colours import PLATE, SHADES, colour, region_bodies, region_colours
 from thermospindle.model.rotor.look.meshes import plate

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.model import sense
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput, listed
-from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.poles import Between
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray

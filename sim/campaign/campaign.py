@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput, listed
 from thermospindle.model.files.formats import CAMPAIGN, CURRENT, KEY
 from thermospindle.model.files.whole import whole
-from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.fields import named, read_file
 from thermospindle.model.units import MINUTE, MM, RPM
 from thermospindle.sim.campaign.form import checked, in_unit, toml

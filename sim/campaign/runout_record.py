@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.cells import plain_number
-from thermospindle.model.machine import Point
 from thermospindle.sim.campaign.uff import read_motion
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}

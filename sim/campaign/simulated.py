@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts

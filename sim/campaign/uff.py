@@ -28,8 +28,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyuff
 
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput, absent
-from thermospindle.model.machine import Point
 from thermospindle.model.scene.fields import SMALLEST
 from thermospindle.model.types import Integers
 from thermospindle.sim.campaign.uff_frame import check_frame

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from thermospindle.model.bearing.row import ring_speeds
-from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Bearing, RollerBearing, Spindle
 from thermospindle.model.rotor.chain import Element
 from thermospindle.model.structure import Body
 from thermospindle.model.types import Array

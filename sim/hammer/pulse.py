@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from thermospindle.model.drawing.measuring import HammerTest
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import HammerTest
 from thermospindle.model.types import Array
 
 PRE_TRIGGER = 2e-3  # s of record before the hit

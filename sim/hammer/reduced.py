@@ -19,7 +19,7 @@ from math import ceil
 import numpy as np
 import scipy
 
-from thermospindle.model.machine import HammerTest
+from thermospindle.model.drawing.measuring import HammerTest
 from thermospindle.model.rotor.frf import point_rows
 from thermospindle.model.rotor.reduced import Reduced, reduced
 from thermospindle.model.types import Array

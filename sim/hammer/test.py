@@ -20,8 +20,9 @@ from typing import TypeVar
 import mujoco
 import numpy as np
 
+from thermospindle.model.drawing.measuring import HammerTest
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import HammerTest, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.parallel import cores
 from thermospindle.model.rotor.chain import Element
 from thermospindle.model.rotor.elements import LINEAR, REDUCED

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts
 from thermospindle.sim.importing.asked import open_conditions, open_ends, open_parts, open_units, scaled, spoken, together, unanswered

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from thermospindle.model.machine import Point
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.types import Array
 
 FORCE_NEEDED = "answers alone, without the force that was hit with, are no measurement that can be used"

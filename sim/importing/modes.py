@@ -5,8 +5,8 @@ from __future__ import annotations
 import cmath
 from collections.abc import Sequence
 
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Point
 from thermospindle.sim.campaign.modes import ModeRow, ShapeAt
 from thermospindle.sim.importing.mapping import MappingForm
 from thermospindle.sim.importing.measured import End, ModeLine, listed

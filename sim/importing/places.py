@@ -6,7 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.measuring import axis_vector
 from thermospindle.model.scene.shafts import resolved_body
 from thermospindle.model.units import MM

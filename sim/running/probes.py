@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import RotorBase, motion_rows
 from thermospindle.model.shaft import Shaft
 from thermospindle.model.types import Array

@@ -14,7 +14,8 @@ from tests.blind.hidden import Hidden
 from tests.blind.laws import REFERENCE
 from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_read, points_struck
 from thermospindle.model.built.tolerance import toleranced
-from thermospindle.model.machine import Condition, HammerTest, Spindle
+from thermospindle.model.drawing.measuring import HammerTest
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.identification.frf import Frf

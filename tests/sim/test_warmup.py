@@ -13,8 +13,9 @@ from tests.conftest import ROOT, coarse_warmups
 from tests.mounting import told_preload
 from tests.sim.conftest import SPEED
 from thermospindle.model.bearing.pair import solve
+from thermospindle.model.drawing.heating import Friction
 from thermospindle.model.errors import BadInput, OutsideRange
-from thermospindle.model.machine import Addition, Condition, Friction
+from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.material import Law
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM

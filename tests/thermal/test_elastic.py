@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermospindle.model.machine import Region
+from thermospindle.model.drawing.section import Region
 from thermospindle.thermal.elastic import Elasticity, Race, Solid
 from thermospindle.thermal.influence import elasticity, races
 from thermospindle.thermal.mesh import section_mesh, tiled

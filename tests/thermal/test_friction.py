@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from thermospindle.model.bearing.row import reference_motion, relative_speed
+from thermospindle.model.drawing.heating import Friction
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import Condition, Friction, RadialLoad
+from thermospindle.model.machine import Condition, RadialLoad
 from thermospindle.model.material import Law, Viscosity
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.bearing import lubricant_film, ring_growth

@@ -8,8 +8,10 @@ from scipy.optimize import brentq
 from scipy.special import j0, j1
 from skfem import Basis
 
+from thermospindle.model.drawing.heating import AirGap, Convection, Friction, HeatSource, Thermal
+from thermospindle.model.drawing.section import Region
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import AirGap, Convection, Friction, HeatSource, Material, Region, Spindle, Thermal
+from thermospindle.model.machine import Material, Spindle
 from thermospindle.model.material import Law
 from thermospindle.model.units import RPM
 from thermospindle.thermal import conduction, heat

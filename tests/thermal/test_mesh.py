@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from skfem import MeshTri
 
-from thermospindle.model.machine import Region
+from thermospindle.model.drawing.section import Region
 from thermospindle.thermal.elastic import Solid
 from thermospindle.thermal.expansion import influence
 from thermospindle.thermal.influence import elasticity, races

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from thermospindle.model.bearing.pair import solve
-from thermospindle.model.machine import Condition, Region
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Condition
 from thermospindle.model.scene.checks import check_raceways
 from thermospindle.thermal import conduction, heat
 from thermospindle.thermal.expansion import expand

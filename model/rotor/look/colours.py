@@ -9,7 +9,8 @@ from zlib import crc32
 
 import numpy as np
 
-from thermospindle.model.machine import Region, Spindle
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.look.shafts import host
 
 COLOURS = {

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermospindle.model.machine import PARTS, Spindle
+from thermospindle.model.drawing.section import PARTS
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.look.colours import PLATE, SHADES, STRIPE, colour, region_bodies, region_colours
 from thermospindle.model.rotor.look.shafts import boxes, drawn_by_shaft, extent, slices
 from thermospindle.model.rotor.section import Cell, cells

@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from thermospindle.model.machine import Region, Spindle
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.section import Cell
 from thermospindle.model.shaft import Segment, Shaft
 from thermospindle.model.types import Array

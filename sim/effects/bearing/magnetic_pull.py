@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import Condition, Region, Spindle
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
 from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio
 from thermospindle.sim.effects.roles import body

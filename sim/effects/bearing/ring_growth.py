@@ -15,7 +15,8 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.model.bearing.row import ring_speeds
-from thermospindle.model.machine import Bearing, Condition, Material, Region, RingMotion, RollerBearing, Spindle
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Bearing, Condition, Material, RingMotion, RollerBearing, Spindle
 from thermospindle.model.rotor.section import cells
 from thermospindle.sim.effects.effect import RINGS, Effect, Values, scale_parameter
 

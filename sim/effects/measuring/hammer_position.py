@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase, point_row
 from thermospindle.sim.effects.effect import Effect, Measurement, Parameter, Values, direction_parameter, hammer_numbers
 

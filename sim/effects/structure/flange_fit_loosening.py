@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from thermospindle.model.machine import Condition, Region, Spindle
+from thermospindle.model.drawing.section import Region
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.structure import Joint
 from thermospindle.sim.effects.effect import Effect, Parameter, Values
 from thermospindle.sim.effects.roles import beyond, joints, lacking, regions

@@ -13,8 +13,9 @@ import numpy as np
 import scipy
 
 from thermospindle.model.bearing.row import relative_speed
+from thermospindle.model.drawing.heating import Friction
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import Bearing, Condition, Friction, RollerBearing, Spindle
+from thermospindle.model.machine import Bearing, Condition, RollerBearing, Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import RINGS, Effect, Parameter, Values, scale_parameter
 from thermospindle.thermal import friction

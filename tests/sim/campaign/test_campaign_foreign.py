@@ -10,8 +10,8 @@ import pytest
 
 from tests.conftest import SCENE
 from tests.made_campaign import FREQUENCY, POINTS, ascii_58, rotor_frf, sets_of
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Point
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import read_campaign, write_campaign
 from thermospindle.sim.campaign.uff import read_frf, read_uff, write_frf

@@ -14,8 +14,9 @@ import pyuff
 from tests.conftest import ROOT
 from thermospindle.diagnosis.runout.lines import look
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Condition, Point
+from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign, write_campaign

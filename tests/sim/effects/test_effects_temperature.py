@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from tests.effect_points import REST, RUNNING
+from thermospindle.model.drawing.heating import Friction
+from thermospindle.model.drawing.section import Region
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import Condition, Friction, Region
+from thermospindle.model.machine import Condition
 from thermospindle.model.material import Law
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
