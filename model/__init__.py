@@ -4,7 +4,7 @@ Imports none of the other packages:
 
 =============  ====================================================================================================
 machine        frozen definitions: spindle and condition
-drawing/       frozen definitions: section, measuring, heat
+drawing/       frozen definitions: section, measuring, heating
 material       frozen definitions: laws over temperature, materials
 structure      frozen definitions: bodies, and joints between them
 shaft          flexible shafts as they are drawn, and the nodes a beam model gives them

@@ -34,7 +34,7 @@ def test_every_name_is_there_and_documented():
     for name in ts.__all__:
         assert getattr(ts, name).__doc__
         assert name in dir(ts)
-    with pytest.raises(AttributeError, match="there are BadInput, NoEquilibrium, add"):
+    with pytest.raises(AttributeError, match="there are BadInput, NoEquilibrium, OutsideRange, add"):
         _ = ts.lode
 
 

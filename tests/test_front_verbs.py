@@ -30,6 +30,11 @@ def test_a_check_is_that_of_the_verb():
     assert json.loads(json.dumps(ts.check("tailstock"))) == without_warnings(told("check", "tailstock"))
 
 
+def test_a_check_tells_of_ones_own_effects_too():
+    found = ts.check("hdd_2003", [ROOT / "docs" / "air_film.py"])
+    assert "air_film" in found["effects"]["can_act"]
+
+
 def test_static_answers_hold_a_unit_force():
     found = ts.static(ts.point("five_bearing", 20))["nose"]
     wanted = told("static", "five_bearing", "--bearings", "computed")["points"]["nose"]
@@ -71,6 +76,12 @@ def test_a_map_is_that_of_the_verb():
         (lambda: ts.runout(ts.point("hdd_2003", 20, speed_rpm=7200), element="reduced"), "element = 'reduced'"),
         (lambda: ts.warmup("hdd_2003", minutes=0), "minutes = 0: must be a finite number above 0"),
         (lambda: ts.resonances("hdd_2003", speed_rpm=-1), "speed_rpm = -1: must be a finite number above 0"),
+        (lambda: ts.runout(ts.point("hdd_2003", 20, speed_rpm=7200), seconds=1e9), "seconds = 1000000000.0: must be a finite number above 0 and up to 100"),
+        (lambda: ts.runout(ts.point("hdd_2003", 20, speed_rpm=7200), path="linear", element="ball-by-ball"), "the harmonic answer of linear bearings"),
+        (lambda: ts.runout(ts.point("mk7702", 20, speed_rpm=1000), element="ball-by-ball"), "no bearing of mk7702 has balls"),
+        (lambda: ts.warmup("hdd_2003", minutes=10**400), "minutes = 1000"),
+        (lambda: ts.resonances("hdd_2003", multiples=0), "multiples = 0: must be a whole number from 1 to 100"),
+        (lambda: ts.load("hdd_2003", values=[]), "values: must be a mapping of values by their keys, not a list"),
         (lambda: ts.answer(3), r"found: must be a diagnosis \(ts.diagnose\), .* not an int"),
         (lambda: ts.point("hdd_2003", 20).frf([1.0, np.nan]), r"frequency = \[1.0, nan\]: must be one row of positive numbers or zero"),
         (lambda: ts.point("hdd_2003", 20).frf(np.ones((2, 2))), "frequency = array.*: must be one row of positive numbers or zero"),

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from thermospindle.front import read_log as read_log
     from thermospindle.model.errors import BadInput as BadInput
     from thermospindle.model.errors import NoEquilibrium as NoEquilibrium
+    from thermospindle.model.errors import OutsideRange as OutsideRange
     from thermospindle.verbs import check as check
     from thermospindle.verbs import resonances as resonances
     from thermospindle.verbs import runout as runout
@@ -40,10 +41,10 @@ if TYPE_CHECKING:
 MODULES = {
     "front": ("add", "answer", "campaign", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log"),
     "verbs": ("check", "resonances", "runout", "static", "table", "warmup"),
-    "model.errors": ("BadInput", "NoEquilibrium"),
+    "model.errors": ("BadInput", "NoEquilibrium", "OutsideRange"),
 }
 __all__ = [
-    "BadInput", "NoEquilibrium", "add", "answer", "campaign", "check", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log",
+    "BadInput", "NoEquilibrium", "OutsideRange", "add", "answer", "campaign", "check", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log",
     "resonances", "runout", "static", "table", "warmup",
 ]  # fmt: skip
 

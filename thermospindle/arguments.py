@@ -13,6 +13,8 @@ import numpy as np
 
 from thermospindle.model.errors import BadInput
 
+FARTHEST = 1e300  # a whole number may be larger than any other
+
 
 def of_kind(name: str, value: object, kinds: tuple[type, ...], told: str) -> None:
     """`BadInput` for an argument of another kind than it is told to be."""
@@ -36,7 +38,7 @@ def several(name: str, value: Sequence[Any], told: str) -> Sequence[Any]:
 
 def number(name: str, value: float, above: float = -np.inf, most: float = np.inf) -> float:
     """The number that an argument is, above `above` and up to `most`; `BadInput` for any other."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value) or not above < value <= most:
+    if isinstance(value, bool) or not isinstance(value, Real) or abs(value) > FARTHEST or not isfinite(value) or not above < value <= most:
         bounds = [f"above {above:g}"] * bool(isfinite(above)) + [f"up to {most:g}"] * bool(isfinite(most))
         raise BadInput(f"{name} = {value!r}: must be a finite number {' and '.join(bounds)}".rstrip())
     return float(value)

@@ -2,7 +2,8 @@
 
 Arguments carry the units people write in their names (C, rpm, Hz, N); what comes back is SI, with the units at its
 fields. Everything raises `BadInput`, one sentence that names file, key or argument, value and what is allowed, for
-what cannot be used; what can be asked and has no answer is `NoEquilibrium`, of bearings that find no balance.
+what cannot be used; what can be asked and has no answer is `NoEquilibrium`, of bearings that find no balance or of heat
+that finds none, and `OutsideRange`, of a law or table that does not reach.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ def load(scene: str | Path, effect_files: Sequence[str | Path] = (), *, values: 
     of_kind("scene", scene, (str, Path), "a scene's folder or the name of a shipped one")
     files = [Path(f) for f in several("effect_files", effect_files, "paths of files")]
     spindle, catalogue = equipped(load_scene(scene), files)
-    if not values:
+    if values is None:
         return spindle
     of_kind("values", values, (Mapping,), "a mapping of values by their keys")
     return with_values(spindle, catalogue, values)
@@ -219,7 +220,7 @@ def answer(found: Diagnosis | Comparison | StiffnessTable | Warmup | ResonanceMa
     errors; of a comparison, a table, a warm-up and a map likewise. docs/site/answers.toml, and the site, say what every key holds.
     """
     for module, kind, told, function in ANSWERED:
-        if isinstance(found, getattr(import_module(f"thermospindle.{module}"), kind)):
+        if type(found).__name__ == kind and isinstance(found, getattr(import_module(f"thermospindle.{module}"), kind)):
             return cast(dict[str, Any], getattr(import_module(f"thermospindle.report.text.{told}"), function)(found))
     names = "a diagnosis (ts.diagnose), a comparison (ts.compare), a table (ts.table), a warm-up (ts.warmup) or a map (ts.resonances)"
     raise BadInput(f"found: must be {names}, not {an(found)}")

@@ -111,9 +111,9 @@ def _count(most: int) -> Callable[[str], int]:
     return _bounded(_whole(1, most, f"a count of one or more, up to {most}"), f"1 to {most}")
 
 
-_bounded(_temperature, f"-273.15 to {HOTTEST:g} C")
-_port = _whole(1, 65535, "a port, 1 to 65535")
-_seed = _whole(0, 10**18 - 1, "a whole number from 0 to 18 digits")
+_bounded(_temperature, f"above -273.15 C, up to {HOTTEST:g}")
+_port = _bounded(_whole(1, 65535, "a port, 1 to 65535"), "1 to 65535")
+_seed = _bounded(_whole(0, 10**18 - 1, "a whole number from 0 to 18 digits"), "a whole number up to 18 digits")
 
 
 def _setting(text: str) -> tuple[str, float]:

@@ -1,14 +1,15 @@
 """The verbs that compute a spindle as functions of `import thermospindle as ts`: what `spindle
 table`, `static`, `check`, `runout`, `warmup` and `map` do.
 
-Arguments carry the units people write in their names; what comes back is SI, with the units at its
-fields, and `ts.answer` makes of it what the command line tells with `--json`.
+Arguments carry the units people write in their names; what comes back is SI, with the units at its fields, and `ts.answer` makes of a table, a
+warm-up or a map what the command line tells with `--json`. What has no answer raises `NoEquilibrium`, and a law that does not reach `OutsideRange`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -22,12 +23,10 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.static import Static
 from thermospindle.model.rotor.static import static as at_point
 from thermospindle.model.units import MINUTE, RPM
-from thermospindle.options import FASTEST, HOTTEST
+from thermospindle.options import FASTEST, HOTTEST, MINUTES, MULTIPLES, SECONDS
 from thermospindle.sim.operating import OperatingPoint, operating_point, stiffness_table
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from thermospindle.sim.resonance.found import ResonanceMap
     from thermospindle.sim.running.runout import Runout
     from thermospindle.sim.warmup import Warmup
@@ -49,8 +48,11 @@ def static(point: OperatingPoint) -> dict[str, Static]:
     return {p.name: at_point(point.spindle, point.chain, p) for p in point.spindle.points}
 
 
-def check(spindle: Spindle | str | Path) -> dict[str, Any]:
-    """What the program understands of a scene, assumes, and finds odd, as `spindle check --json`: numbers with units in their keys."""
+def check(spindle: Spindle | str | Path, effect_files: Sequence[str | Path] = ()) -> dict[str, Any]:
+    """What the program understands of a scene, assumes, and finds odd, as `spindle check --json`: numbers with units in their keys.
+
+    `effect_files` hold effects of your own, which are told to act or not as those of the catalogue are.
+    """
     from thermospindle.report.check.looked import looked
     from thermospindle.report.check.odd import odd as oddities
     from thermospindle.report.check.understood import understood
@@ -58,7 +60,8 @@ def check(spindle: Spindle | str | Path) -> dict[str, Any]:
 
     drawing = drawing_of(spindle)
     reference = operating_point(drawing, Condition(drawing.reference_temperature))
-    return understood(drawing, reference, catalogue()) | {"odd": oddities(looked(drawing, reference))}
+    known = catalogue([Path(f) for f in several("effect_files", effect_files, "paths of files")])
+    return understood(drawing, reference, known) | {"odd": oddities(looked(drawing, reference))}
 
 
 def runout(
@@ -79,11 +82,13 @@ def runout(
 
     of_kind("point", point, (OperatingPoint,), "an operating point (ts.point)")
     if seconds is not None:
-        number("seconds", seconds, 0.0)
+        number("seconds", seconds, 0.0, SECONDS)
     if path is not None and path not in PATHS:
         raise BadInput(f"path = {path!r}: {instead(str(path), PATHS)}")
     if element not in ELEMENTS:
         raise BadInput(f"element = {element!r}: {instead(str(element), ELEMENTS)}")
+    if element != "linear" and not point.spindle.bearings:
+        raise BadInput(f"element = {element!r}: no bearing of {point.spindle.name} has balls; allowed is linear")
     if seed is not None:
         whole("seed", seed, 0, 10**18 - 1)
         point = replace(point, spindle=replace(point.spindle, imperfections=drawn(point.spindle, seed)))
@@ -110,7 +115,7 @@ def warmup(
     speed = drawing.nominal_speed if speed_rpm is None else number("speed_rpm", speed_rpm, -FASTEST, FASTEST) * RPM
     start = drawing.reference_temperature if temperature_C is None else number("temperature_C", temperature_C, -273.15, HOTTEST)
     air = None if air_C is None else number("air_C", air_C, -273.15, HOTTEST)
-    duration = None if minutes is None else MINUTE * number("minutes", minutes, 0.0)
+    duration = None if minutes is None else MINUTE * number("minutes", minutes, 0.0, MINUTES)
     return warm_up(drawing, speed, start, air, duration, progress=progress)
 
 
@@ -121,21 +126,23 @@ def resonances(
     speed_rpm: float | None = None,
     temperatures_C: Sequence[float] | None = None,
     speeds_rpm: Sequence[float] | None = None,
+    multiples: int = 3,
     progress: Callable[[str], None] = lambda done: None,
 ) -> ResonanceMap:
     """Natural frequencies against every bearing and unbalance line over temperature and speed,
     about a nominal condition: `.coincidences`, `.tracks`, `.lines`.
 
-    By default the scene's range, and speeds up to twice the nominal one.
+    By default the scene's range, and speeds up to twice the nominal one; lines up to so many `multiples` of the number of balls.
     """
     from thermospindle.sim.resonance.map import SPEEDS, TEMPERATURES, fastest, resonance_map
 
     drawing = drawing_of(spindle)
+    whole("multiples", multiples, 1, MULTIPLES)
     speed = drawing.nominal_speed if speed_rpm is None else number("speed_rpm", speed_rpm, 0.0, FASTEST) * RPM
     temperature = drawing.reference_temperature if temperature_C is None else number("temperature_C", temperature_C, -273.15, HOTTEST)
     speeds = np.linspace(0, fastest(drawing, speed), SPEEDS).tolist() if speeds_rpm is None else _speeds("speeds_rpm", speeds_rpm)
     grid = _temperatures(drawing, temperatures_C, TEMPERATURES)
-    return resonance_map(drawing, grid, speeds, Condition(temperature, speed), progress=progress, nearby=speeds_rpm is not None)
+    return resonance_map(drawing, grid, speeds, Condition(temperature, speed), multiples, progress=progress, nearby=speeds_rpm is not None)
 
 
 def _temperatures(spindle: Spindle, asked: Sequence[float] | None, steps: int) -> list[float]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,8 @@ MULTIPLE = 4  # of the number of balls and of even ball orders: highest lines lo
 REACH = {"none": 1, "hann": 2, "flattop": 4}  # bins on either side that hold a line of a spectrum: those that share bins are one
 OF_BINS = 0.04  # relative error of an amplitude from bins
 AROUND = 15  # bins on either side from which the floor around a line is estimated
-SLIPS = np.linspace(-0.006, 0.006, 25)  # relative changes of d cos(angle) / D that are tried
+SLIPS = np.linspace(-0.006, 0.006, 49)  # relative changes of d cos(angle) / D that are tried
+CHANCE = 6.0  # standard deviations of what a fit to noise gains
 SLIP_SD = 0.002  # how well a contact angle is believed, as that change
 FORM, LEAKS = 0.015, 0.03  # relative error of a line's form, and of what it leaks into its neighbours, however well its frequency is known
 APART = 6e-4  # how far the bearings' slips may differ from the common one
@@ -111,7 +111,7 @@ def look(spindle: Spindle, test: Test) -> Seen:
         clusters = _clusters(known, together)
         return clusters, np.array([float(np.mean(sorted({g.frequency for g in cluster}))) for cluster in clusters])
 
-    slip = _slip(record, lambda slip: at(slip)[1]) if kin and record.kind == "time" else 0.0  # bins of a spectrum are no finer than its lines
+    slip = _slip(record, at) if kin and record.kind == "time" else 0.0  # bins of a spectrum are no finer than its lines
     clusters, frequency = at(slip)
     turning = abs(condition.speed) / (2 * np.pi)
     if record.kind == "time":
@@ -190,10 +190,29 @@ def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: flo
 # ---------------------------------------------------------------- the cage
 
 
-def _slip(record: RunoutRecord, frequency_at: Callable[[float], Array]) -> float:
-    """The likeliest slip: that whose lines leave least of the record, with its prior. What is left counts bin by bin
-    by its logarithm over the floor, as errors with the wings of Student's distribution do (Lange, Little & Taylor,
-    *J. Am. Statist. Assoc.* 84 (1989) 881): a strong line that no slip explains pulls no more than a weak one."""
+def _power(record: RunoutRecord) -> tuple[Array, Array]:
+    """Frequency (m,) and squared amplitude over its median around (m,) of a time record, summed over probes, finely interpolated."""
+    n = record.value.shape[1]
+    centred = (record.value - record.value.mean(axis=1, keepdims=True)) * np.hanning(n + 1)[:-1]
+    value = np.abs(np.fft.rfft(centred, 8 * n)) ** 2
+    floor = np.maximum(np.median(value, axis=1, keepdims=True), np.finfo(float).tiny)
+    return np.asarray(np.fft.rfftfreq(8 * n, record.step), float), np.asarray((value / floor).sum(axis=0))
+
+
+def _slip(record: RunoutRecord, at: Callable[[float], tuple[list[list[Line]], Array]]) -> float:
+    """The likeliest slip, with its prior, of a record whose lines are `at` some frequencies.
+
+    By what the lines leave of the record, bin by bin by its logarithm over the floor, as errors with the wings of
+    Student's distribution do (Lange, Little & Taylor, *J. Am. Statist. Assoc.* 84 (1989) 881): a strong line that no slip explains pulls no
+    more than a weak one. Where that gains no more than a fit to noise does, by how strong the balls' lines are: which holds in noise, but is
+    blunt, for a record shows two lines that lie near as one.
+    """
+    frequency, strength = _power(record)
+
+    def strong(slip: float) -> float:
+        balls = {g.frequency for cluster in at(slip)[0] for g in cluster if g.bearing}
+        return float(np.log1p(np.interp(sorted(balls), frequency, strength)).sum()) - 0.5 * (slip / SLIP_SD) ** 2
+
     window = np.hanning(record.value.shape[1] + 1)[:-1]
 
     def squares(value: Array) -> Array:
@@ -201,14 +220,18 @@ def _slip(record: RunoutRecord, frequency_at: Callable[[float], Array]) -> float
 
     floor = np.maximum(np.median(squares(record.value), axis=1, keepdims=True), np.finfo(float).tiny)
 
-    @cache
-    def unlikely(slip: float) -> float:
-        left = squares(_least_squares(record, frequency_at(slip)).residual)
-        return float(np.log1p(left / floor).sum()) + 0.5 * (slip / SLIP_SD) ** 2
+    def left(slip: float) -> float:
+        return float(np.log1p(squares(_least_squares(record, at(slip)[1]).residual) / floor).sum()) + 0.5 * (slip / SLIP_SD) ** 2
 
-    best = min(SLIPS.tolist(), key=unlikely)
-    step = float(SLIPS[1] - SLIPS[0])
-    return float(minimize_scalar(unlikely, bounds=(best - step, best + step), method="bounded", options={"xatol": step / 50}).x)
+    scores = [strong(s) for s in SLIPS]
+    best, step = int(np.clip(np.argmax(scores), 1, len(SLIPS) - 2)), float(SLIPS[1] - SLIPS[0])
+    low, middle, high = scores[best - 1 : best + 2]
+    bend = low - 2 * middle + high
+    blunt = float(SLIPS[best] + (0.5 * (low - high) / bend * step if bend < 0 else 0.0))
+    near = min(SLIPS[::2].tolist(), key=left)
+    sharp = minimize_scalar(left, bounds=(near - 2 * step, near + 2 * step), method="bounded", options={"xatol": step / 25})
+    chance = CHANCE * float(np.sqrt(len(at(blunt)[1]) * len(record.nodes)))
+    return float(sharp.x) if sharp.fun < left(blunt) - chance or abs(sharp.x - blunt) < step else blunt
 
 
 # ---------------------------------------------------------------- a time record

@@ -67,26 +67,23 @@ def _exchange(path: Path, new: Path, old: Path) -> None:
     be moved. Of several writers the last one's stays, whole."""
     old.parent.mkdir()
     for attempt in range(ATTEMPTS):
-        moved = False
         try:
             if path.is_dir():
                 os.replace(path, old)
-                moved = True
             os.replace(new, path)
             return
         except OSError as error:  # another writer has taken away what stood here, or put its own
             if error.errno not in (ENOENT, ENOTEMPTY, EEXIST) or not new.exists() or attempt == ATTEMPTS - 1:
-                _put_back(old, path, moved)
+                _put_back(old, path)
                 raise OSError(error.errno, error.strerror, str(path)) if error.errno else error from None
         except BaseException:
-            _put_back(old, path, moved)
+            _put_back(old, path)
             raise
-        if moved:
-            shutil.rmtree(old, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
 
 
-def _put_back(old: Path, path: Path, moved: bool) -> None:
-    if moved and not path.exists():
+def _put_back(old: Path, path: Path) -> None:
+    if old.exists() and not path.exists():
         os.replace(old, path)
 
 
@@ -138,10 +135,11 @@ def _clear(folder: Path, pattern: str) -> None:
 def alone(folder: Path) -> Iterator[None]:
     """The only process that writes into a folder bit by bit; `BadInput` where another one does, until it ends or dies.
 
-    Without locks of folders (Windows, some network drives) nothing is said.
+    Without locks of folders (Windows, some network drives) nothing is said. FileNotFoundError where there is no such folder.
     """
     held = _lock(folder)
     if held == HELD:
+        folder.stat()
         raise BadInput(f"{folder}: another run is writing there; wait for it to end, or name another folder")
     try:
         yield
@@ -157,7 +155,7 @@ def _lock(folder: Path) -> int | None:
         return None
     try:
         descriptor = os.open(folder, os.O_RDONLY)
-    except OSError:
+    except FileNotFoundError:  # another writer took it for a dead one's
         return HELD
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -104,7 +104,7 @@ def check_rollers(file: Path, spindle: Spindle) -> None:
             rows = b.z + b.offsets[0], b.z + b.offsets[-1]
             for name in (b.inner_ring, b.outer_ring):
                 ring = spindle.region(name)
-                if not ring.z[0] <= rows[0] <= rows[1] <= ring.z[1]:
+                if not ring.z[0] - 1e-9 <= rows[0] <= rows[1] <= ring.z[1] + 1e-9:
                     raise BadInput(
                         f"{file}: bearings.{b.name}: row_spacing_mm = {b.row_spacing * 1e3:g}: the middles of its {b.rows} rows at z_mm = {rows[0] * 1e3:g} to {rows[1] * 1e3:g} "
                         f"lie outside its ring {name!r}, which spans z_mm = {_mm(ring.z)}"

@@ -35,10 +35,9 @@ UNITS = {
         "/signals": "nm", "/numbers/quoted": "m", "/numbers/lines:frequency": "Hz", "/numbers/lines:amplitude": "m", "/numbers/lines:forward": "m", "/numbers/lines:backward": "m",
         "/numbers/waterfall:frequency": "Hz", "/numbers/waterfall:natural": "Hz", "/numbers/waterfall:radial": "m", "/numbers/waterfall:axial": "m",
     },
-    "warmup": {"/series/regions": "C", "/series/bearings/temperature": "C", "/series/bearings/preload": "N", "/series/bearings/contact angle": "deg", "/series/modes": "Hz of change since the start"},
 }  # fmt: skip
-"""By kind of log the units of numbers whose names have none, by entity, or entity and component; of
-an FRF it is that of its `quantity`. Every log holds its own, at `numbers/units`."""
+"""By kind of log the units of numbers whose names have none, by what an entity's path begins with, or that and its component or its last part;
+of an FRF it is that of its `quantity`. A log holds its own at `numbers/units`; components of other kinds of logs have units in their names."""
 
 
 @contextmanager

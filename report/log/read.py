@@ -87,7 +87,7 @@ class Log:
 
     @cached_property
     def units(self) -> dict[str, str]:
-        """Units of numbers whose names have none, by entity or entity:component; nothing in logs that were written before there were any."""
+        """Units of numbers whose names have none, by what their entity begins with, and its component; nothing in logs without any."""
         table = self.table("/numbers/units")
         return dict(zip(table.get("of", ()), table.get("unit", ()), strict=True))
 

@@ -30,7 +30,7 @@ def _as_described(log: Log) -> Iterator[None]:
 def log_json(log: Log) -> dict[str, Any]:
     """What a log holds, with its numbers as nested lists."""
     with _as_described(log):
-        return {"scene": log.scene, "entities": list(log.entities), **SHOW[log.kind][0](log)}
+        return {"scene": log.scene, "entities": list(log.entities), "units": log.units, **SHOW[log.kind][0](log)}
 
 
 def describe(log: Log) -> str:

@@ -83,6 +83,7 @@ def fit(time: Array, value: Array, frequency: Array) -> Fit:
         return np.vstack([np.cos(turn), -np.sin(turn), np.ones((1, turn.shape[1]))])
 
     square, projected = np.zeros((2 * k + 1, 2 * k + 1)), np.zeros((2 * k + 1, len(value)))
+    rows = np.zeros((0, 0))
     for piece in pieces:
         rows = basis(piece)
         square += rows @ rows.T
@@ -91,7 +92,7 @@ def fit(time: Array, value: Array, frequency: Array) -> Fit:
     eigen, vectors = np.linalg.eigh(square * np.outer(scale, scale))
     kept = eigen > CUTOFF * eigen[-1]
     found = (((vectors[:, kept] / eigen[kept]) @ (vectors[:, kept].T @ (scale[:, None] * projected))) * scale[:, None]).T
-    residual = value - np.hstack([found @ basis(piece) for piece in pieces])
+    residual = value - np.hstack([found @ (basis(piece) if len(pieces) > 1 else rows) for piece in pieces])
     phasor = (found[:, :k] + 1j * found[:, k : 2 * k]) * np.exp(-2j * np.pi * frequency * middle)
     return Fit(np.asarray(frequency), phasor, found[:, -1], residual)
 

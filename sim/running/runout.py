@@ -231,6 +231,8 @@ def planned(point: OperatingPoint, seconds: float | None = None, element: str = 
     speed = point.condition.speed
     if speed == 0:
         raise BadInput("--speed 0: a spindle at rest has no runout; give a speed in rpm")
+    if path == "linear" and element != "linear":
+        raise BadInput(f"--path linear is the harmonic answer of linear bearings; --element {element} is simulated")
     ratio = speed_ratio(point.spindle)
     turn = 2 * np.pi / abs(speed * ratio)
     if seconds is not None and seconds < 2 * turn:

@@ -188,6 +188,16 @@ def test_a_contact_angle_a_little_off_is_found_from_the_record(spindle) -> None:
     assert moved == pytest.approx(0.003, abs=1e-4)  # d / D of the scene is that much too small
 
 
+def test_noise_moves_no_cage_further_than_its_angle_is_uncertain(spindle) -> None:
+    """One line and noise on two probes: the least that a record leaves is then found anywhere."""
+    test, found = hidden(spindle, {}, 8, own=True).tests[2], []
+    random, time = np.random.default_rng(0), test.runout.axis
+    for _ in range(6):
+        value = 1e-8 * np.cos(2 * np.pi * 120 * time) + 1e-9 * random.standard_normal((2, len(time)))
+        found.append(look(spindle, replace(test, runout=replace(test.runout, value=value, nodes=test.runout.nodes[:2]))).slip)
+    assert np.sqrt(np.mean(np.square(found))) < 0.002
+
+
 def test_a_record_sampled_too_slowly_for_the_balls_is_refused(spindle) -> None:
     made = hidden(spindle, {}, 1).tests[2]
     slow = replace(made.runout, axis=made.runout.axis[::16], value=made.runout.value[:, ::16])  # 22.2 kHz / 16

@@ -124,6 +124,40 @@ def test_where_folders_have_no_locks_things_are_written_all_the_same(tmp_path, m
         pass
 
 
+def test_where_no_lock_can_be_asked_for_nothing_goes_on_for_ever(tmp_path, monkeypatch):
+    """As at the limit of open files: a folder after the other was made."""
+    opened = os.open
+
+    def full(path, *asked, **more):
+        if asked[0] == os.O_RDONLY and Path(path).is_dir():
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+        return opened(path, *asked, **more)
+
+    monkeypatch.setattr(whole_files.os, "open", full)
+    with pytest.raises(OSError, match="open files"):
+        write(tmp_path / "a", "new")
+
+
+def test_a_folder_that_is_not_there_is_not_said_to_be_written(tmp_path):
+    with pytest.raises(FileNotFoundError), whole_files.alone(tmp_path / "nowhere"):
+        pass
+
+
+def test_an_interrupt_between_the_moves_puts_the_old_one_back(tmp_path, monkeypatch):
+    write(tmp_path / "a", "old")
+    move = os.replace
+
+    def interrupted(path, target):
+        move(path, target)
+        if Path(path) == tmp_path / "a":
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(whole_files.os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path / "a", "new")
+    assert (tmp_path / "a" / "text").read_text() == "old"
+
+
 RACE = """
 import sys
 from pathlib import Path

@@ -38,3 +38,10 @@ def test_numbers_that_contradict_their_description_are_refused(told, tmp_path):
     log = read_log(logged(tmp_path / "a.rrd", "T20_n0", responses=(1, 2)))
     with pytest.raises(BadInput, match=r"a.rrd: is not a whole log of thermospindle: what it holds is not what it says of itself"):
         told(log)
+
+
+def test_units_are_of_what_is_in_the_log(tmp_path):
+    log = read_log(logged(tmp_path / "a.rrd", "T20_n0"))
+    assert log.units["/numbers/peaks:frequency"] == "Hz"
+    peaks = {of.partition(":")[2] for of in log.units if of.startswith("/numbers/peaks")}
+    assert peaks <= set(log.table("/numbers/peaks"))

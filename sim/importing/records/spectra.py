@@ -135,9 +135,9 @@ def _apart(files: Sequence[tuple[Path, Sequence[Motion]]], names: str) -> Questi
     ends = [[m.end for m in motions if not m.force] for _, motions in files]
     if any(of != ends[0] for of in ends):
         return Question(names, "test", 'other responses than the files of the same hammer point beside them: a test = "..." of their own')
-    quantities = [[told and told[0] for m in motions if not m.force for told in [units.of_response(m.unit)]] for _, motions in files]
-    if any(of != quantities[0] for of in quantities):
-        return Question(names, "columns", "responses of one quantity in all files of a hammer point; some are " + listed(sorted({q for of in quantities for q in of if q})))
+    quantities = [[told[0] if told else "" for m in motions if not m.force for told in [units.of_response(m.unit)]] for _, motions in files]
+    if different := [of for of in map(set, zip(*quantities, strict=True)) if len(of - {""}) > 1]:  # of one that is not told the file is asked
+        return Question(names, "columns", f"responses of one quantity in all files of a hammer point; some are {listed(sorted(different[0]))}")
     steps = {m.step for _, motions in files for m in motions}
     if max(steps) > min(steps) * (1 + 1e-6):
         return Question(names, "sample_rate_Hz", f"one sampling rate; its records have {listed(f'{1 / s:g} Hz' for s in sorted(steps))}")

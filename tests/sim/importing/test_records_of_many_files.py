@@ -13,7 +13,7 @@ POUND = 4.4482216152605  # N
 
 def recorded(folder, force_units, response_units):
     """A file a hit on point 1, the response in the unit told."""
-    random, per = np.random.default_rng(5), {"m/s": 1.0, "mm/s": 1e-3, "lbf": POUND, "N": 1.0, "m/s^2": 1.0}
+    random, per = np.random.default_rng(5), {"m/s": 1.0, "mm/s": 1e-3, "lbf": POUND, "N": 1.0, "m/s^2": 1.0, "furlong": 1.0}
     for k, (force_unit, unit) in enumerate(zip(force_units, response_units, strict=True)):
         force, answer = hit(random)
         head = f"Time [s],force 1 [{force_unit}],velocity 1 [{unit}]"
@@ -41,3 +41,10 @@ def test_velocities_and_accelerations_are_no_one_response(tmp_path):
     files = recorded(tmp_path, ["N"] * 3, ["mm/s", "m/s^2", "mm/s"])
     with pytest.raises(Unanswered, match="responses of one quantity in all files of a hammer point; some are accelerance, mobility"):
         bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c")
+
+
+def test_a_unit_that_nobody_knows_is_asked_for_as_that(tmp_path):
+    files = recorded(tmp_path, ["N"] * 2, ["m/s^2", "furlong"])
+    with pytest.raises(Unanswered, match="the unit of its response") as told:
+        bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert "one quantity" not in str(told.value)
