@@ -18,6 +18,7 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.model.machine import Condition
+from thermospindle.model.units import RPM
 from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.workbench import bench as benches
@@ -28,8 +29,11 @@ from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.running.runout import runout
+from thermospindle.sim.running.waterfall import run_up, waterfall
 
 LINES = np.arange(400.0, 6000.0, 4.0)
+SPEED = 7200 * RPM
 
 
 @pytest.fixture(scope="session")
@@ -112,3 +116,15 @@ def served(tmp_path_factory):
     rest, _ = process.communicate(timeout=20)
     assert process.returncode == 0
     assert rest == "", "one JSON object and nothing else"
+
+
+@pytest.fixture(scope="session")
+def record(spindle):
+    """The reference spindle as it runs out at its service speed."""
+    return runout(operating_point(spindle, Condition(40.0, SPEED)), 0.25, path="linear")
+
+
+@pytest.fixture(scope="session")
+def spectra(spindle):
+    """Its lines over speed."""
+    return waterfall(spindle, 40.0, run_up(SPEED))

@@ -6,40 +6,18 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import j0, j1
-from skfem import Basis
 
-from thermospindle.model.drawing.heating import AirGap, Convection, Friction, HeatSource, Thermal
-from thermospindle.model.drawing.section import Region
+from tests.thermal.bodies import bare, material, nodes, two_rings
+from thermospindle.model.drawing.heating import Convection, HeatSource
+from thermospindle.model.drawing.section import PARTS, Region
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import Material, Spindle
 from thermospindle.model.material import Law
 from thermospindle.model.units import RPM
 from thermospindle.thermal import conduction, heat
 from thermospindle.thermal.expansion import influence
-from thermospindle.thermal.mesh import element, section_mesh
+from thermospindle.thermal.mesh import section_mesh
 
-PARTS = ("stationary", "rotating")
 AT_REST = heat.Running(air=20.0, speed=0.0, loads={})
-
-
-def bare(spindle: Spindle, *regions: Region, **materials: Material) -> Spindle:
-    """`regions` of `materials` (by keyword) alone: no bearings, no heat but what a test adds."""
-    return replace(
-        spindle,
-        regions=regions,
-        materials=materials,
-        bearings=(),
-        thermal=Thermal((), (), (), Friction(0.0, 0.0, Law((20.0,), (1e-5,)), 0.0)),
-    )
-
-
-def material(young=200e9, poisson=0.3, expansion=1e-5, density=8000.0, conductivity=40.0, capacity=500.0) -> Material:
-    return Material("test", Law((20.0,), (young,)), poisson, Law((20.0,), (expansion,)), density, conductivity, capacity)
-
-
-def nodes(model, part):
-    mesh = model.sections[part].mesh
-    return Basis(mesh, element(mesh)).doflocs
 
 
 @pytest.fixture(scope="module")
@@ -128,24 +106,6 @@ def test_soak_at_rest_is_uniform(reference):
 # ------------------------------------------------------------------ coupling of the parts
 
 
-def two_rings(spindle, conductance=0.0, gaps=()):
-    """An outer ring with a film and an inner ring with a heater, of nearly perfect conductors."""
-    copper = material(conductivity=1e6)
-    inner = Region("inner", "stationary", "copper", (2e-3, 4e-3), (0, 6e-3))
-    outer = Region("outer", "rotating", "copper", (6e-3, 9e-3), (2e-3, 9e-3))
-    own = bare(spindle, inner, outer, copper=copper)
-    bearing = replace(spindle.bearings[0], inner_ring="inner", outer_ring="outer")
-    thermal = replace(
-        own.thermal,
-        convections=(Convection(("outer",), 50.0),),
-        sources=(HeatSource("heater", ("inner",), 2.0, 100.0, 1.0),),
-        gaps=gaps,
-        friction=Friction(0.0, 0.0, Law((20.0,), (1e-5,)), conductance),
-    )
-    own = replace(own, bearings=(bearing,), thermal=thermal)
-    return conduction.model(own, {part: section_mesh(own, part, 0.7e-3) for part in PARTS})
-
-
 def test_all_heat_passes_the_bearing(spindle):
     """2 W through 0.25 W/K: 8 K between the raceways; the film carries them at 2 W / (50 W/m2K x surface without raceway)."""
     model = two_rings(spindle, conductance=0.25)
@@ -156,33 +116,6 @@ def test_all_heat_passes_the_bearing(spindle):
     assert means["inner"] - means["outer"] == pytest.approx(8.0, rel=1e-3)
     assert means["outer"] - 25.0 == pytest.approx(2.0 / (50 * surface), rel=1e-3)
     assert heat.flows(model, field, drive).crossing == pytest.approx(-2.0, rel=3e-8)
-
-
-def test_all_heat_passes_the_air_gap(spindle):
-    """The rings face each other from z = 2 to 6 mm: conductance h x 2 pi x 4 mm x 4 mm, over the area of the first region."""
-    model = two_rings(spindle, gaps=(AirGap(("inner", "outer"), 500.0),))
-    means = heat.steady(model, heat.running(model.spindle, 25.0, 100.0)).region_means()
-    assert means["inner"] - means["outer"] == pytest.approx(2.0 / (500 * 2 * np.pi * 4e-3 * 4e-3), rel=1e-3)
-
-
-@pytest.mark.parametrize("film", [50.0, 80.0])
-def test_chamber_air_does_not_reach_into_a_gap(spindle, film):
-    """Both rings with a film, no bearing: each loses the stretch z = 2 to 6 mm of its facing side, at its own radius."""
-    own = replace(two_rings(spindle).spindle, bearings=())
-    convections = tuple(Convection((name,), film) for name in ("inner", "outer"))
-    own = replace(own, thermal=replace(own.thermal, convections=convections, gaps=(AirGap(("inner", "outer"), 500.0),)))
-    model = conduction.model(own, {part: section_mesh(own, part, 0.7e-3) for part in PARTS})
-    inner = (2e-3 + 4e-3) * 6e-3 + (4e-3**2 - 2e-3**2) - 4e-3 * 4e-3
-    outer = (6e-3 + 9e-3) * 7e-3 + (9e-3**2 - 6e-3**2) - 6e-3 * 4e-3
-    for part, area in zip(PARTS, (inner, outer), strict=True):
-        assert model.film[model.spans[part]].sum() == pytest.approx(film * 2 * np.pi * area, rel=1e-9)
-    assert model.convection @ np.ones(model.film.size) == pytest.approx(model.film, abs=1e-12)
-
-
-def test_two_gaps_may_not_share_a_face(spindle):
-    twice = (AirGap(("inner", "outer"), 500.0), AirGap(("outer", "inner"), 100.0))
-    with pytest.raises(ValueError, match="two gaps share"):
-        two_rings(spindle, gaps=twice)
 
 
 def lubricated(model, **friction):
@@ -223,32 +156,6 @@ def test_loads_that_nearly_run_away_settle_at_the_sum_of_their_series(spindle, b
     field = heat.settled(model, drive, 20.0)
     assert drive(model.nodal(field)).loads[b.name] == pytest.approx(10.0 / (1 - back), rel=1e-6)
     assert heat.feedback(model, field, drive) == pytest.approx(back, rel=1e-4)
-
-
-def test_gap_couples_equal_heights(spindle):
-    """A temperature that is the same function of height on both sides sends no heat across; one that differs sends h dT dA."""
-    model = two_rings(spindle, gaps=(AirGap(("inner", "outer"), 500.0),))
-    heights = np.concatenate([nodes(model, part)[1] for part in PARTS])
-    assert model.exchange @ (3.0 + 1e3 * heights**2 / 9e-3) == pytest.approx(0.0, abs=1e-12)
-    warm = np.concatenate([np.full(nodes(model, part).shape[1], t) for part, t in (("stationary", 1.0), ("rotating", 0.0))])
-    crossing = (model.exchange @ warm)[model.spans["stationary"]].sum()
-    assert crossing == pytest.approx(500 * 2 * np.pi * 4e-3 * 4e-3, rel=1e-9)
-
-
-def test_axial_gap_and_regions_that_do_not_face(spindle):
-    model = two_rings(spindle)
-    own = model.spindle
-    above = replace(own.region("outer"), r=(3e-3, 8e-3), z=(7e-3, 9e-3))
-    disc = replace(own, regions=(own.region("inner"), above), bearings=())
-    disc = replace(disc, thermal=replace(own.thermal, gaps=(AirGap(("inner", "outer"), 500.0),)))
-    sections = {part: section_mesh(disc, part, 0.7e-3) for part in PARTS}
-    exchange = conduction.model(disc, sections).exchange
-    warm = np.zeros(exchange.shape[0])
-    warm[: nodes(model, "stationary").shape[1]] = 1.0
-    assert warm @ (exchange @ warm) == pytest.approx(500 * np.pi * (4e-3**2 - 3e-3**2), rel=1e-9)
-    away = replace(disc, regions=(own.region("inner"), replace(above, r=(5e-3, 8e-3), z=(7e-3, 9e-3))))
-    with pytest.raises(ValueError, match="face each other"):
-        conduction.model(away, {part: section_mesh(away, part, 0.7e-3) for part in PARTS})
 
 
 # ------------------------------------------------------------------ the reference spindle running
