@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,7 @@ def _write(question: str, section: PartMesh, races: Sequence[Race], more: dict[s
     kept.write(KIND, question, _code(), notes, {"p": section.mesh.p, "t": section.mesh.t, "region_of": section.region_of, **arrays})
 
 
+@cache
 def _code() -> str:
     """The text of this package and of what it asks of others, and the versions of the libraries."""
     libraries = f"{skfem.__version__} {np.__version__} {scipy.__version__}"

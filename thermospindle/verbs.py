@@ -20,6 +20,7 @@ from thermospindle.model.built.drawn import drawn
 from thermospindle.model.errors import BadInput, instead
 from thermospindle.model.files.stiffness_table import STEPS, StiffnessTable
 from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor.elements import ELEMENTS, check_element
 from thermospindle.model.rotor.static import Static
 from thermospindle.model.rotor.static import static as at_point
 from thermospindle.model.units import MINUTE, RPM
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from thermospindle.sim.running.runout import Runout
     from thermospindle.sim.warmup import Warmup
 
-PATHS, ELEMENTS = ("simulated", "linear"), ("linear", "ball-by-ball")
+PATHS = ("simulated", "linear")
 
 
 def table(spindle: Spindle | str | Path, temperatures_C: Sequence[float] | None = None, *, speeds_rpm: Sequence[float] = (0.0,)) -> StiffnessTable:
@@ -53,15 +54,13 @@ def check(spindle: Spindle | str | Path, effect_files: Sequence[str | Path] = ()
 
     `effect_files` hold effects of your own, which are told to act or not as those of the catalogue are.
     """
-    from thermospindle.report.check.looked import looked
-    from thermospindle.report.check.odd import odd as oddities
-    from thermospindle.report.check.understood import understood
+    from thermospindle.report.check.odd import told
     from thermospindle.sim.effects.known import catalogue
 
     drawing = drawing_of(spindle)
     reference = operating_point(drawing, Condition(drawing.reference_temperature))
     known = catalogue([Path(f) for f in several("effect_files", effect_files, "paths of files")])
-    return understood(drawing, reference, known) | {"odd": oddities(looked(drawing, reference))}
+    return told(drawing, reference, known)
 
 
 def runout(
@@ -87,8 +86,7 @@ def runout(
         raise BadInput(f"path = {path!r}: {instead(str(path), PATHS)}")
     if element not in ELEMENTS:
         raise BadInput(f"element = {element!r}: {instead(str(element), ELEMENTS)}")
-    if element != "linear" and not point.spindle.bearings:
-        raise BadInput(f"element = {element!r}: no bearing of {point.spindle.name} has balls; allowed is linear")
+    check_element(point.spindle, element)
     if seed is not None:
         whole("seed", seed, 0, 10**18 - 1)
         point = replace(point, spindle=replace(point.spindle, imperfections=drawn(point.spindle, seed)))
@@ -134,13 +132,13 @@ def resonances(
 
     By default the scene's range, and speeds up to twice the nominal one; lines up to so many `multiples` of the number of balls.
     """
-    from thermospindle.sim.resonance.map import SPEEDS, TEMPERATURES, fastest, resonance_map
+    from thermospindle.sim.resonance.map import SPEEDS, TEMPERATURES, resonance_map, speeds_about
 
     drawing = drawing_of(spindle)
     whole("multiples", multiples, 1, MULTIPLES)
     speed = drawing.nominal_speed if speed_rpm is None else number("speed_rpm", speed_rpm, 0.0, FASTEST) * RPM
     temperature = drawing.reference_temperature if temperature_C is None else number("temperature_C", temperature_C, -273.15, HOTTEST)
-    speeds = np.linspace(0, fastest(drawing, speed), SPEEDS).tolist() if speeds_rpm is None else _speeds("speeds_rpm", speeds_rpm)
+    speeds = speeds_about(drawing, speed, SPEEDS) if speeds_rpm is None else _speeds("speeds_rpm", speeds_rpm)
     grid = _temperatures(drawing, temperatures_C, TEMPERATURES)
     return resonance_map(drawing, grid, speeds, Condition(temperature, speed), multiples, progress=progress, nearby=speeds_rpm is not None)
 

@@ -30,6 +30,7 @@ REACH = {"none": 1, "hann": 2, "flattop": 4}  # bins on either side that hold a 
 OF_BINS = 0.04  # relative error of an amplitude from bins
 AROUND = 15  # bins on either side from which the floor around a line is estimated
 SLIPS = np.linspace(-0.006, 0.006, 49)  # relative changes of d cos(angle) / D that are tried
+FINE = 8  # places a bin at which a spectrum is looked at
 CHANCE = 6.0  # standard deviations of what a fit to noise gains
 SLIP_SD = 0.002  # how well a contact angle is believed, as that change
 FORM, LEAKS = 0.015, 0.03  # relative error of a line's form, and of what it leaks into its neighbours, however well its frequency is known
@@ -190,13 +191,15 @@ def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: flo
 # ---------------------------------------------------------------- the cage
 
 
-def _power(record: RunoutRecord) -> tuple[Array, Array]:
-    """Frequency (m,) and squared amplitude over its median around (m,) of a time record, summed over probes, finely interpolated."""
-    n = record.value.shape[1]
-    centred = (record.value - record.value.mean(axis=1, keepdims=True)) * np.hanning(n + 1)[:-1]
-    value = np.abs(np.fft.rfft(centred, 8 * n)) ** 2
-    floor = np.maximum(np.median(value, axis=1, keepdims=True), np.finfo(float).tiny)
-    return np.asarray(np.fft.rfftfreq(8 * n, record.step), float), np.asarray((value / floor).sum(axis=0))
+def _squares(value: Array, length: int) -> Array:
+    """Squares (probes, m) of the spectrum of a record (probes, n) under a Hann window, filled up with zeros to a `length`."""
+    n = value.shape[1]
+    return np.asarray(np.abs(np.fft.rfft((value - value.mean(axis=1, keepdims=True)) * np.hanning(n + 1)[:-1], length)) ** 2)
+
+
+def _over(squares: Array, floor: Array) -> Array:
+    """By how much squares are larger than a floor that they may be without."""
+    return np.asarray(squares / np.maximum(floor, np.finfo(float).tiny))
 
 
 def _slip(record: RunoutRecord, at: Callable[[float], tuple[list[list[Line]], Array]]) -> float:
@@ -207,21 +210,18 @@ def _slip(record: RunoutRecord, at: Callable[[float], tuple[list[list[Line]], Ar
     more than a weak one. Where that gains no more than a fit to noise does, by how strong the balls' lines are: which holds in noise, but is
     blunt, for a record shows two lines that lie near as one.
     """
-    frequency, strength = _power(record)
+    n = record.value.shape[1]
+    fine = _squares(record.value, FINE * n)
+    strength = _over(fine, np.median(fine, axis=1, keepdims=True)).sum(axis=0)
+    frequency, floor = np.fft.rfftfreq(FINE * n, record.step), np.median(fine[:, ::FINE], axis=1, keepdims=True)
 
     def strong(slip: float) -> float:
         balls = {g.frequency for cluster in at(slip)[0] for g in cluster if g.bearing}
         return float(np.log1p(np.interp(sorted(balls), frequency, strength)).sum()) - 0.5 * (slip / SLIP_SD) ** 2
 
-    window = np.hanning(record.value.shape[1] + 1)[:-1]
-
-    def squares(value: Array) -> Array:
-        return np.asarray(np.abs(np.fft.rfft((value - value.mean(axis=1, keepdims=True)) * window)) ** 2)
-
-    floor = np.maximum(np.median(squares(record.value), axis=1, keepdims=True), np.finfo(float).tiny)
-
     def left(slip: float) -> float:
-        return float(np.log1p(squares(_least_squares(record, at(slip)[1]).residual) / floor).sum()) + 0.5 * (slip / SLIP_SD) ** 2
+        rest = _least_squares(record, at(slip)[1]).residual
+        return float(np.log1p(_over(_squares(rest, n), floor)).sum()) + 0.5 * (slip / SLIP_SD) ** 2
 
     scores = [strong(s) for s in SLIPS]
     best, step = int(np.clip(np.argmax(scores), 1, len(SLIPS) - 2)), float(SLIPS[1] - SLIPS[0])

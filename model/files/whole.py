@@ -101,9 +101,9 @@ def _work_folder(path: Path) -> tuple[Path, int | None]:
             error.filename = str(path)  # nobody has asked for the work folder
             raise
         lock = _lock(work)
-        if lock is None or (lock >= 0 and work.exists()):
+        if lock is None or (lock != HELD and work.exists()):
             return work, lock
-        if lock >= 0:
+        if lock != HELD:
             os.close(lock)
 
 
@@ -120,7 +120,7 @@ def _clear(folder: Path, pattern: str) -> None:
     """Put back what killed runs had moved away, and remove their work folders."""
     for work in folder.glob(pattern):
         lock = _lock(work)
-        if lock is None or lock < 0:
+        if lock is None or lock == HELD:
             continue  # another process is writing there, or nobody can tell
         try:
             for old in (work / OLD).glob("*"):

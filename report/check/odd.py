@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +18,14 @@ from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.units import HERTZ, MM, RPM
-from thermospindle.report.check.looked import Looked
+from thermospindle.report.check.looked import Looked, looked
 from thermospindle.report.check.odd_bearings import OF_BEARINGS
+from thermospindle.report.check.understood import understood
 from thermospindle.sim.effects import of_scene
-from thermospindle.sim.effects.effect import refusal
+from thermospindle.sim.effects.effect import Effect, refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
 from thermospindle.sim.hammer.test import damped_throughout
-from thermospindle.sim.operating import mass_between
+from thermospindle.sim.operating import OperatingPoint, mass_between
 from thermospindle.sim.resonance.critical import criticals
 
 WEAK = 0.1
@@ -60,6 +62,11 @@ MOVES_FREE = 1e-6
 """Of the largest of a free motion, from which a part takes part in it."""
 MANY_STEPS = 1e6
 """Of integration in a virtual hammer test, some minutes of computing for a flexible shaft."""
+
+
+def told(spindle: Spindle, reference: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, Any]:
+    """What is understood of a scene, and what is odd about it: all that `spindle check --json` tells."""
+    return understood(spindle, reference, catalogue) | {"odd": odd(looked(spindle, reference))}
 
 
 def odd(found: Looked) -> list[str]:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from thermospindle.report.figures.report import Curve
 from thermospindle.report.page.comparison import SAME_TEMPERATURE, compared
 from thermospindle.report.page.headlines import calibration, headlines, misses
 from thermospindle.report.typeset import minus, signed, with_error
+from thermospindle.sim.identification.frf import POWER
 from thermospindle.sim.identification.numbering import identified, in_band, same_speed, temperature_of
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.run import Run, Step
@@ -156,8 +158,8 @@ def driving_points(run: Run, steps: Sequence[Step]) -> dict[str, list[Curve]]:
     The exact one is evaluated under the test's exponential window, which evaluates an FRF at i omega + decay.
     """
     panels = {}
-    for letter, node in zip("abcdefgh", run.spindle.hammer.hammer_nodes, strict=False):
-        point = run.spindle.point(node)
+    for k, node in enumerate(run.spindle.hammer.hammer_nodes):
+        letter, point = ascii_lowercase[k % 26] * (k // 26 + 1), run.spindle.point(node)
         curves = []
         for step in steps:
             estimate, decay = step.test.estimate.h1, step.test.estimate.window_decay
@@ -181,9 +183,8 @@ def _measured_curves(run: Run, step: Step, node: int) -> Iterator[Curve]:
             h = test.frf
             assert h is not None
             value = h.value[h.response_nodes.index(node), h.reference_nodes.index(node)]
-            power = {"receptance": 1, "mobility": 0, "accelerance": -1}[h.quantity]
             used = h.frequency > 0
-            yield Curve("measured", temperature_of(step), h.frequency[used], value[used] * (2j * np.pi * h.frequency[used]) ** power)
+            yield Curve("measured", temperature_of(step), h.frequency[used], value[used] / (2j * np.pi * h.frequency[used]) ** POWER[h.quantity])
 
 
 def bearing_figures(run: Run) -> list[tuple[str, Markup]]:

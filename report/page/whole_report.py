@@ -22,7 +22,7 @@ from thermospindle.report.text.warmup import warmup_section
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.map import fastest, resonance_map, stages
+from thermospindle.sim.resonance.map import resonance_map, speeds_about, stages
 from thermospindle.sim.run import Run
 from thermospindle.sim.running.runout import planned, runout, with_imperfections
 from thermospindle.sim.warmup import STAGES, warm_up
@@ -81,7 +81,7 @@ def turning(spindle: Spindle, temperatures: Sequence[float], speed: float, progr
         yield "Resonance map", f"<p>Left out: a map goes over temperatures, and this report has {low:g} °C alone.</p>"
         return
     progress("mapping resonances")
-    grid = np.linspace(low, high, OVER_TEMPERATURE).tolist(), np.linspace(0, fastest(spindle, speed), OVER_SPEED).tolist()
+    grid = np.linspace(low, high, OVER_TEMPERATURE).tolist(), speeds_about(spindle, speed, OVER_SPEED)
     yield _computed("Resonance map", lambda: map_section(resonance_map(spindle, *grid, condition, progress=progress)))
 
 

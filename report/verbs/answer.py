@@ -15,7 +15,6 @@ from thermospindle.model.drawing.measuring import FAINTEST
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.stiffness_table import STEPS
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.elements import BALLS, LINEAR
 from thermospindle.report.folder import check_folder, mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.known import equipped
@@ -83,12 +82,6 @@ def with_hammer(spindle: Spindle, hits: int | None, level: float | None) -> Spin
         raise BadInput(f"--level {level:g}: the hammer's peak force must be positive, {FAINTEST:g} N or more")
     changes = {key: value for key, value in (("hits", hits), ("level", level)) if value is not None}
     return replace(spindle, hammer=replace(spindle.hammer, **changes))  # type: ignore[arg-type]
-
-
-def check_element(spindle: Spindle, element: str | None) -> None:
-    """`BadInput` for balls by themselves where no bearing has any: it would be the linear element in silence."""
-    if element == BALLS and not spindle.bearings:
-        raise BadInput(f"--element {element}: no bearing of {spindle.name} has balls; allowed is {LINEAR}")
 
 
 def write_json(name: str, more: Callable[[Path], None] = lambda folder: None) -> Callable[[Path, dict[str, Any]], None]:

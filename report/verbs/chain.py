@@ -11,7 +11,7 @@ from rich.console import Console
 from thermospindle.model import sense
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.rotor.elements import ELEMENTS, LINEAR, REDUCED
+from thermospindle.model.rotor.elements import ELEMENTS, LINEAR, REDUCED, check_element
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import NM, RPM
 from thermospindle.report.folder import mark, whole_folder
@@ -20,7 +20,6 @@ from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
-    check_element,
     check_out,
     temperature_or_reference,
     temperatures_or_range,

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from thermospindle.model import sense
 from thermospindle.model.built.drawn import PLAUSIBLE, drawn
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.elements import check_element
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.report.progress import hint, progress_bar
 from thermospindle.report.text.resonance import map_json, show_map, write_map
@@ -21,7 +20,6 @@ from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_j
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
-    check_element,
     check_out,
     temperature_or_reference,
     temperatures_or_range,
@@ -29,7 +27,7 @@ from thermospindle.report.verbs.answer import (
 )
 from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
-from thermospindle.sim.resonance.map import SPEEDS, TEMPERATURES, fastest, resonance_map, stages
+from thermospindle.sim.resonance.map import SPEEDS, TEMPERATURES, resonance_map, speeds_about, stages
 from thermospindle.sim.running.run import record_steps
 from thermospindle.sim.running.runout import planned, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
@@ -143,7 +141,7 @@ def resonances(
     speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
     nominal = Condition(temperature_or_reference(temperature, spindle), speed)
     grid = temperatures_or_range(temperatures, spindle, TEMPERATURES)
-    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, fastest(spindle, speed), SPEEDS).tolist()
+    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else speeds_about(spindle, speed, SPEEDS)
     with progress_bar(stages(spindle, len(grid))) as progress:
         found = resonance_map(spindle, grid, speeds, nominal, multiples, progress=progress, nearby=bool(speeds_rpm))
     conditions = [nominal, *(Condition(t, s) for t in grid for s in speeds)]

@@ -6,7 +6,6 @@ import json
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
@@ -47,15 +46,13 @@ def check(scene: Path, effect_files: Sequence[Path] = (), out: Path | None = Non
     """What the program understands of a scene, assumes and finds odd; a folder holds `check.json`, `check.html` and the picture."""
     asked = dict(locals())
     from thermospindle.model.machine import Condition  # `new` computes nothing, and waits for nothing that does
-    from thermospindle.report.check.looked import looked
-    from thermospindle.report.check.odd import odd
-    from thermospindle.report.check.understood import understood
+    from thermospindle.report.check.odd import told
     from thermospindle.report.check.words import show_check
     from thermospindle.sim.operating import operating_point
 
     spindle, catalogue = with_effects(scene, effect_files)
     point = operating_point(spindle, Condition(spindle.reference_temperature))
-    values: dict[str, Any] = understood(spindle, point, catalogue) | {"odd": odd(looked(spindle, point))}
+    values = told(spindle, point, catalogue)
 
     def page(folder: Path) -> None:
         from thermospindle.report.check.page import write_check  # matplotlib takes its time to load

@@ -96,9 +96,10 @@ def _with(nominal: float, values: Sequence[float]) -> Array:
     return np.unique([nominal, *every[~np.isclose(every, nominal, rtol=1e-9, atol=1e-9)]])
 
 
-def fastest(spindle: Spindle, nominal: float) -> float:
-    """Speed (rad/s) up to which a map about a `nominal` one goes: twice that, or as far as the tables of bearings given by numbers."""
-    return min([2 * nominal, *(b.speed[-1] for b in spindle.linear_bearings if len(b.speed) > 1)])
+def speeds_about(spindle: Spindle, nominal: float, count: int) -> list[float]:
+    """So many speeds (rad/s) of a map about a `nominal` one: from rest to twice that, or as far as the tables of bearings given by numbers."""
+    fastest = min([2 * nominal, *(b.speed[-1] for b in spindle.linear_bearings if len(b.speed) > 1)])
+    return np.linspace(0, fastest, count).tolist()
 
 
 def stages(spindle: Spindle, temperatures: int) -> int:

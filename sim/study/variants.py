@@ -42,9 +42,10 @@ def variant(raw: Mapping[str, Any], file: Path, catalogue: Sequence[Effect], cho
     """
     of_effects: dict[str, dict[str, float]] = {}
     for key, value in chosen.items():
-        if (parts := key.split("."))[0] == EFFECTS:
-            of_effects.setdefault(parts[1], {})[parts[2]] = value
-    spindle = build(_changed(raw, {key: value for key, value in chosen.items() if key.split(".")[0] != EFFECTS}), file)
+        if _of_effect(key):
+            _, name, parameter = key.split(".")
+            of_effects.setdefault(name, {})[parameter] = value
+    spindle = build(_changed(raw, _of_scene(chosen)), file)
     return _with_effects(spindle, of_effects, catalogue)
 
 
@@ -57,7 +58,7 @@ def with_values(spindle: Spindle, catalogue: Sequence[Effect], values: Mapping[s
 
     def found(of: Mapping[str, Any]) -> Spindle:
         for key, value in of.items():
-            if key.split(".")[0] == EFFECTS:
+            if _of_effect(key):
                 _check_effect(spindle, key.split("."), [value], catalogue)
         return variant(raw, file, catalogue, of)
 
@@ -71,10 +72,18 @@ def with_values(spindle: Spindle, catalogue: Sequence[Effect], values: Mapping[s
     try:
         return found(chosen)
     except BadInput as error:
-        if len(chosen) == 1:
-            raise BadInput(f"values[{next(iter(chosen))!r}]: {error}") from None
         alone = next((key for key in chosen if not refused({k: v for k, v in chosen.items() if k != key})), None)  # without which all is well
         raise BadInput(f"values{'' if alone is None else f'[{alone!r}]'}: {error}") from None
+
+
+def _of_effect(key: str) -> bool:
+    """Whether a dotted key is of an effect's parameter, and none of the scene."""
+    return key.split(".")[0] == EFFECTS
+
+
+def _of_scene(chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """Of chosen values those of the scene's own keys."""
+    return {key: value for key, value in chosen.items() if not _of_effect(key)}
 
 
 def _plain(value: Any) -> Any:
@@ -92,10 +101,10 @@ def check(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, ca
 
     Values that only together give no spindle are rows of the study with their error.
     """
-    others = [{key: values[at] for key, values in study.vary if key.split(".")[0] != EFFECTS} for at in (0, -1)]
+    others = [_of_scene({key: values[at] for key, values in study.vary}) for at in (0, -1)]
     for key, values in study.vary:
         try:
-            if key.split(".")[0] == EFFECTS:
+            if _of_effect(key):
                 _check_effect(spindle, key.split("."), values, catalogue)
             else:
                 for value in values:
