@@ -146,13 +146,12 @@ def assert_margin(
 ) -> None:
     """No line of the bearings or the unbalance comes nearer to the mode than `at_least_percent` of its frequency.
 
-    Lines in the mode's own direction count, of waviness up to `multiples` of the number of balls; at every
-    temperature given, the ends of the scene's range by default, and between two where it is on one side of the
+    Lines in the mode's own direction count, of waviness up to `multiples` of the number of balls, with the
+    first sidebands where a load displaces rings; at every temperature given, the ends of the scene's range by default, and between two where it is on one side of the
     mode at the one and on the other at the other. The mode is named at the first and followed by its shape.
     """
     __tracebackhide__ = True
     from thermospindle.model.bearing.kinematics import lines, row_kinematics
-    from thermospindle.model.bearing.pair import check_centred
     from thermospindle.model.errors import BadInput
 
     _asked(["at_least_percent"], at_least_percent=at_least_percent)
@@ -169,7 +168,6 @@ def assert_margin(
     near: list[tuple[float, str]] = []
     before: dict[str, tuple[float, float]] = {}
     for point in sorted(points, key=lambda p: p.condition.temperature):
-        check_centred(point.spindle, point.state, "assert_margin")
         own = _partner(points[0], point, index, _partners(points[0], point))
         found, temperature = {}, point.condition.temperature
         for line in lines(point.spindle, row_kinematics(point.spindle, point.state), point.condition.speed, multiples):

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, key_of
+from thermospindle.model.bearing.pair import check_centred
 from thermospindle.model.built.drawn import GRADES, held_over
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.built.tolerance import toleranced
@@ -86,6 +87,7 @@ def _all(spindle: Spindle, at: Sequence[OperatingPoint], probes: Sequence[Sequen
 
 def phasors(point: OperatingPoint, imperfections: Imperfections, probes: Sequence[Point]) -> dict[Key, ComplexArray]:
     """Phasors (probes,) m of every line that imperfections would excite at a point."""
+    check_centred(point.spindle, point.state, "comparing runout tests with the model")  # sidebands and a perfect row's lines are no sources of their own
     forces = at_speed(excitation(point, imperfections), 1.0)
     moved = chain_response(point.chain, forces)
     rows = np.array([np.array(p.direction) @ motion_rows(point.chain, p.body, p.position)[:3] for p in probes])

@@ -30,6 +30,8 @@ from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
 ROUNDS, STANDING = 20, 1e-12  # of the cage's speed, and what of it is no change
+TURNS = 8
+"""Places of the cage from one ball to the next at which a row is asked how far it departs from its mean."""
 ROUNDED = 4 * 2.0**-52
 """Of a distance of groove centres, what rounding may change of the two that a ball's centre divides it into."""
 
@@ -143,7 +145,7 @@ def respond(row: BallRow, displacement: Array | None = None, near: Rolled | None
     """
     u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
     line = centre_line(row, u)
-    local, cage, rolled = _with_inertia(row, line, near) if row.heavy else (_massless(row, line), None, None)
+    local, cage, rolled = _with_inertia(row, line, near) if row.heavy else (massless(row, line), None, None)
     force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
     b = kinematics(row)
     flat = b.reshape(-1, 5)
@@ -153,7 +155,7 @@ def respond(row: BallRow, displacement: Array | None = None, near: Rolled | None
     return RowForce(force.ravel() @ flat, tangent, inner, outer, inner_angle, outer_angle, deformation, rolled)
 
 
-def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
+def massless(row: BallRow, line: Array) -> tuple[Array, ...]:
     """Force (balls, 2) and stiffness (balls, 2, 2) of balls without inertia: f = F e, k = F' e e^T + F/L (1 - e e^T)."""
     length = np.linalg.norm(line, axis=1)
     e = line / length[:, None]
@@ -176,7 +178,7 @@ class Cage:
 
 
 def _with_inertia(row: BallRow, line: Array, near: Rolled | None) -> tuple[tuple[Array, ...], Cage | None, Rolled]:
-    """As `_massless` at the speed of the cage, with the centre of every ball an unknown of its own; and what the cage does as rings move."""
+    """As `massless` at the speed of the cage, with the centre of every ball an unknown of its own; and what the cage does as rings move."""
     lines = [(r, z) for r, z in line.tolist()]
     speed, found = at_one_speed(row, lines) if near is None else at_one_speed(row, lines, dict(zip(lines, near.centres, strict=True)), near.cage)
     balances, each = zip(*(found[at] for at in lines), strict=True)
@@ -196,6 +198,19 @@ def with_cage_held(row: BallRow) -> BallRow:
         return row
     line = -row.radial, row.axial
     return replace(row, inertia=replace(row.inertia, cage=at_one_speed(row, [line])[0]))
+
+
+def cage_spread(row: BallRow, displacement: Array) -> float:
+    """By how much of itself the radial stiffness of a row whose rings stand at a displacement (5,) departs, at most,
+    from its mean as its balls pass from each to the place of the next; 0 of one that carries nothing."""
+    near, across = respond(row, displacement).rolled, []
+    for turn in 2 * np.pi / row.balls * np.arange(TURNS) / TURNS:
+        c, s = np.cos(turn), np.sin(turn)
+        turned = np.eye(5)
+        turned[:2, :2] = turned[3:, 3:] = [[c, s], [-s, c]]
+        across.append((turned.T @ respond(row, turned @ displacement, near).tangent @ turned)[:2, :2])
+    mean = np.mean(across, axis=0)
+    return float(np.abs(np.array(across) - mean).max() / np.abs(mean).max()) if mean.any() else 0.0
 
 
 def by_own_orbits(row: BallRow, displacement: Array | None = None) -> Array:

@@ -27,12 +27,17 @@ ball waviness      2 k                   axial      2 k f_ball
 
 Odd orders of a ball lift it at one contact as much as they lower it at the opposite one and cancel to first order. Cylindrical rollers have the
 same lines under the same names, Z those of one row and the contact angle 0, but none along the axis, in which they are free.
+
+Rings that a radial load or weight displaces press their balls by azimuth, so that each of these comes with sidebands, and in every
+direction: a race wave of order k Z + s at k Z (f_race - f_cage) + s f_race for any s (s = 1 and -1 across, 0 along the axis are those above),
+ball sizes at s f_cage, ball waves at 2 k f_ball + s f_cage. The balls that carry change as they pass, which moves the rings of a perfect
+row too, at k Z f_cage (*varying compliance*: Sunnersjo 1978, *J. Sound Vib.* 58, 363; Harris, ch. 25). No sense of whirl is then of one sign.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +56,7 @@ class Kinematics:
 
     `inner`, `outer`: rings; `cage`: the set of balls about the spindle axis; `spin`: a ball about its own axis, seen from the cage, a
     magnitude; `balls` those of one row, or its rollers, whose `angled` is False: no contact angle moves their lines, and none are axial.
+    `displaced`: under a radial load or weight, with sidebands.
     """
 
     inner: float
@@ -59,6 +65,7 @@ class Kinematics:
     spin: float
     balls: int
     angled: bool = True
+    displaced: bool = False
 
     @property
     def over_inner(self) -> float:
@@ -85,7 +92,8 @@ class Line:
     """One frequency at which the unbalance or an imperfection of a bearing excites, in linear theory.
 
     `bearing` is empty for the unbalance; `cause` is one of CAUSES; `order` is that of the waviness, 0 where there is none; `name` in the
-    field's words; `direction` radial or axial; `whirl` +1 in the sense of turning (forward), -1 against it, 0 for axial ones.
+    field's words; `direction` radial or axial; `whirl` +1 in the sense of turning (forward), -1 against it, 0 for axial ones and for what
+    displaced rings alone make, which goes both ways.
     """
 
     bearing: str
@@ -97,7 +105,10 @@ class Line:
     frequency: float  # Hz, not negative
 
 
-CAUSES = ("unbalance", "inner waviness", "outer waviness", "ball waviness", "ball size", "cage unbalance")
+VARYING = "varying compliance"
+CAUSES = ("unbalance", "inner waviness", "outer waviness", "ball waviness", "ball size", "cage unbalance", VARYING)
+SIDEBANDS = 2
+"""Of a row with displaced rings, up to which `lines` has them; weaker ones are in runout, as far as `sim.running.rows` says."""
 
 
 def kinematics(
@@ -125,7 +136,8 @@ def row_kinematics(spindle: Spindle, state: PairState) -> dict[str, Kinematics]:
             return rolling((0.0, 0.0), b.rollers, b.roller_diameter / b.pitch_diameter, inner, outer, angled=False)
         return kinematics(state.bearing(b.name), b.balls, b.ball_diameter, b.pitch_diameter, inner, outer)
 
-    return {b.name: of(b) for b in spindle.rolling}
+    displaced = {b.name for b in state.rolling if any(b.displacement)}
+    return {b.name: replace(of(b), displaced=b.name in displaced) for b in spindle.rolling}
 
 
 # ---------------------------------------------------------------- lines
@@ -136,59 +148,62 @@ def unbalance_line(speed: float) -> Line:
     return Line("", "unbalance", 0, "1x", "radial", 1, abs(speed) / (2 * np.pi))
 
 
-def cage_line(bearing: str, kin: Kinematics, cause: str) -> Line:
-    """The radial line at the cage frequency, of ball sizes or of the cage's unbalance."""
-    return _radial(bearing, cause, 0, "fc", kin.cage, kin)
+def cage_line(bearing: str, kin: Kinematics, cause: str, times: int = 1, direction: str = "radial") -> Line:
+    """The line at the cage frequency, of ball sizes or of the cage's unbalance; between displaced rings also at several `times` that, and axial."""
+    name = "fc" if times == 1 else f"{times} fc"
+    return _line(bearing, cause, 0, name, direction, 1 if times == 1 else 0, times * kin.cage, kin)
 
 
-def race_line(bearing: str, kin: Kinematics, side: str, order: int, direction: str) -> Line:
-    """The line of a race wave of `order` k Z + 1 or k Z - 1 (radial) or k Z (axial); `side` is inner or outer.
+def varying_line(bearing: str, kin: Kinematics, passes: int, direction: str) -> Line:
+    """The line of a perfect row whose balls pass where displaced rings press them; `passes` is a multiple of their number."""
+    return _line(bearing, VARYING, passes, f"{passes} fc", direction, 0, passes * kin.cage, kin)
+
+
+def race_line(bearing: str, kin: Kinematics, side: str, order: int, direction: str, passes: int | None = None) -> Line:
+    """The line of a race wave of `order`; `side` is inner or outer, `passes` the multiple of the number Z of balls at
+    whose passing it is felt. Between centred rings that follows: order - 1 or order + 1 across the axis, order along it.
 
     Raises ValueError for an order that the row cancels.
     """
-    cause, ring = f"{side} waviness", kin.ring(side)
-    f = "f" + side[0]
-    if direction == "axial":
-        if order % kin.balls:
-            raise ValueError(f"a race wave of order {order} does nothing axial on {kin.balls} balls")
-        name = f"{order} fc" if ring == 0.0 else f"{order} ({f}-fc)"
-        return Line(bearing, cause, order, name, "axial", 0, order * abs(ring - kin.cage) / (2 * np.pi))
-    if (order - 1) % kin.balls and (order + 1) % kin.balls:
-        raise ValueError(f"a race wave of order {order} does nothing radial on {kin.balls} balls")
-    sign = 1 if (order - 1) % kin.balls == 0 else -1
-    passes = order - sign  # k Z
-    speed = ring + sign * passes * (ring - kin.cage)
-    if passes == 0:
-        name = f
-    elif ring == 0.0:
-        name = f"{passes} fc"
-    elif sign > 0:
-        name = f"{passes} ({f}-fc) + {f}"
-    else:
-        name = f"{passes} ({f}-fc) - {f}" if speed * ring < 0 else f"{f} - {passes} ({f}-fc)"
-    return _radial(bearing, cause, order, name, speed, kin)
+    if passes is None:
+        passes = _centred_passes(kin.balls, order, direction)
+    ring, f, sideband = kin.ring(side), f"f{side[0]}", order - passes
+    turn = passes * (ring - kin.cage) + sideband * ring
+    name = f"{abs(passes)} fc" if ring == 0.0 else _sum((passes, f"({f}-fc)"), (sideband, f), turn * ring < 0)
+    return _line(bearing, f"{side} waviness", order, name, direction, sideband, turn, kin)
+
+
+def _centred_passes(balls: int, order: int, direction: str) -> int:
+    for passes in (order,) if direction == "axial" else (order - 1, order + 1):
+        if passes % balls == 0:
+            return passes
+    raise ValueError(f"a race wave of order {order} does nothing {direction} on {balls} balls")
 
 
 def ball_line(bearing: str, kin: Kinematics, order: int, direction: str, side: int = 0) -> Line:
-    """The line of a ball wave of `order`: axial, or radial with the cage added (`side` +1) or taken away (-1)."""
-    if direction == "axial":
-        return Line(bearing, "ball waviness", order, f"{order} fb", "axial", 0, order * kin.spin / (2 * np.pi))
+    """The line of a ball wave of `order`: axial, or radial with the cage added (`side` +1) or taken away (-1); between displaced rings any side."""
     forward = np.sign(kin.turning)
-    speed = kin.cage + side * forward * order * kin.spin
-    if side > 0 or speed * forward < 0:
-        name = f"{order} fb {'+' if side > 0 else '-'} fc"
-    else:
-        name = f"fc - {order} fb"
-    return _radial(bearing, "ball waviness", order, name, float(speed), kin)
+    turn = forward * order * kin.spin + side * kin.cage
+    return _line(bearing, "ball waviness", order, _sum((order, "fb"), (side, "fc"), turn * forward < 0), direction, side, float(turn), kin)
 
 
-def _radial(bearing: str, cause: str, order: int, name: str, speed: float, kin: Kinematics) -> Line:
-    whirl = int(np.sign(speed) * np.sign(kin.turning))
-    return Line(bearing, cause, order, name, "radial", whirl, abs(speed) / (2 * np.pi))
+def _sum(first: tuple[int, str], second: tuple[int, str], negative: bool) -> str:
+    """Two multiples in words, such as "12 (fi-fc) - 2 fi"; the other way round where they add up to less than nothing."""
+    terms = [(-n if negative else n, name) for n, name in (first, second) if n]
+    terms.sort(key=lambda term: term[0] < 0)
+    words = [name if abs(n) == 1 else f"{abs(n)} {name}" for n, name in terms]
+    return f" {'-' if terms[-1][0] < 0 else '+'} ".join(words)
+
+
+def _line(bearing: str, cause: str, order: int, name: str, direction: str, side: int, turn: float, kin: Kinematics) -> Line:
+    """Of what turns by `turn` (rad/s) and is felt with the azimuth's harmonic `side`: 1 or -1 whirl."""
+    whirl = int(side * np.sign(turn) * np.sign(kin.turning)) if direction == "radial" and abs(side) == 1 else 0
+    return Line(bearing, cause, order, name, direction, whirl, abs(turn) / (2 * np.pi))
 
 
 def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], speed: float, highest_multiple: int = 3) -> list[Line]:
-    """All lines of linear theory for k up to `highest_multiple`, multiples of Z and even ball orders alike, in order of frequency.
+    """All lines of linear theory for k up to `highest_multiple`, multiples of Z and even ball orders
+    alike, in order of frequency; of displaced rings with `SIDEBANDS`.
 
     `speed` (rad/s) is the spindle's, of which what is unbalanced has its own ratio. Orders that
     stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
@@ -196,14 +211,33 @@ def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], spe
     found: list[Line] = []
     for name in (b.name for b in spindle.rolling):
         kin = kinematics_by_bearing[name]
-        found += [cage_line(name, kin, "ball size"), cage_line(name, kin, "cage unbalance")]
-        for side in ("inner", "outer"):
-            found.append(race_line(name, kin, side, 1, "radial"))
-            for passes in range(kin.balls, highest_multiple * kin.balls + 1, kin.balls):
-                found += [race_line(name, kin, side, passes + by, "radial") for by in (-1, 1)]
-                found += [race_line(name, kin, side, passes, "axial")] if kin.angled else []
-        for order in range(2, 2 * highest_multiple + 1, 2):
-            found += [ball_line(name, kin, order, "radial", by) for by in (-1, 1)]
-            found += [ball_line(name, kin, order, "axial")] if kin.angled else []
+        found += _sidebands(name, kin, highest_multiple) if kin.displaced else _centred(name, kin, highest_multiple)
     found.append(unbalance_line(speed * unbalanced(spindle).speed_ratio))
     return sorted((line for line in found if line.frequency > SMALLEST), key=lambda line: line.frequency)
+
+
+def _centred(name: str, kin: Kinematics, highest: int) -> Iterator[Line]:
+    yield cage_line(name, kin, "ball size")
+    yield cage_line(name, kin, "cage unbalance")
+    for side in ("inner", "outer"):
+        yield race_line(name, kin, side, 1, "radial")
+        for passes in range(kin.balls, highest * kin.balls + 1, kin.balls):
+            yield from (race_line(name, kin, side, passes + by, "radial") for by in (-1, 1))
+            if kin.angled:
+                yield race_line(name, kin, side, passes, "axial")
+    for order in range(2, 2 * highest + 1, 2):
+        yield from (ball_line(name, kin, order, "radial", by) for by in (-1, 1))
+        if kin.angled:
+            yield ball_line(name, kin, order, "axial")
+
+
+def _sidebands(name: str, kin: Kinematics, highest: int) -> Iterator[Line]:
+    passing = range(kin.balls, highest * kin.balls + 1, kin.balls)
+    sides = range(-SIDEBANDS, SIDEBANDS + 1)
+    yield cage_line(name, kin, "cage unbalance")
+    for direction in ("radial", "axial") if kin.angled else ("radial",):
+        yield from (cage_line(name, kin, "ball size", times, direction) for times in range(1, SIDEBANDS + 1))
+        yield from (varying_line(name, kin, passes, direction) for passes in passing)
+        for ring in ("inner", "outer"):
+            yield from (race_line(name, kin, ring, passes + by, direction, passes) for passes in (0, *passing) for by in sides if 0 < passes + by <= passing[-1] + 1)
+        yield from (ball_line(name, kin, order, direction, by) for order in range(2, 2 * highest + 1, 2) for by in sides)

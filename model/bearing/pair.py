@@ -98,6 +98,11 @@ class PairState:
         """The roller bearings by name."""
         return {b.name: b for b in self.linear if isinstance(b, RollerState)}
 
+    @property
+    def rolling(self) -> tuple[BearingState | RollerState, ...]:
+        """Ball rows, then roller bearings."""
+        return (*self.bearings, *(b for b in self.linear if isinstance(b, RollerState)))
+
     def bearing(self, name: str) -> BearingState:
         """A ball row's state. Raises `BadInput` naming those there are, and `any_bearing` for what is no ball row."""
         if any(b.name == name for b in self.linear):
@@ -111,8 +116,8 @@ def check_centred(spindle: Spindle, state: PairState, what: str) -> None:
     if any(b.displacement for b in state.bearings):
         told = spindle.radial_loads[0].told if spindle.radial_loads else f"gravity_m_per_s2 = [{spindle.gravity[0]:g}, {spindle.gravity[1]:g}]"
         raise BadInput(
-            f"{spindle.file or spindle.name}: {told}: {what} is for centred rings, and this displaces them; take it out, or ask what their stiffness decides: "
-            "modes, table, static, impact with linear elements"
+            f"{spindle.file or spindle.name}: {told}: {what} is for centred rings, and this displaces them; take it out, or ask what knows displaced rings: "
+            "linear elements, in modes, table, static, impact, runout and map"
         )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState
-from thermospindle.model.bearing.roller import RollerState, cage_spread
+from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.carrier import load_carrier, unbalance_carrier
 from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import THEORIES, Shaft
@@ -19,6 +19,7 @@ from thermospindle.sim.effects.effect import Effect, refusal
 from thermospindle.sim.hammer.excited import unseen
 from thermospindle.sim.hammer.pulse import pulse_duration
 from thermospindle.sim.operating import OperatingPoint
+from thermospindle.sim.running.rows import cage_spread
 
 ASSUMED = "assumed default: "
 NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
@@ -156,7 +157,7 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) 
             "pitch_diameter_mm": _mm(b.pitch_diameter),
             "clearance_um": 1e6 * state.clearance,
             "roller_force_N": state.contact_force,
-            "cage_spread": cage_spread(state.row, np.array(state.displacement)),
+            "cage_spread": cage_spread(state),
         }
     if isinstance(b, LinearBearing):
         table = {"temperatures_C": list(b.temperature), "speeds_rpm": [in_rpm(s) for s in b.speed]} if len(b.temperature) * len(b.speed) > 1 else None
@@ -175,6 +176,7 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) 
         "load_lines_meet_axis_at_mm": _mm(apex(b, own.contact_angle)),
         "preload_N": own.preload,
         "ball_force_N": own.contact_force,
+        "cage_spread": cage_spread(own),
         "raceway_mm": {"inner": [_mm(z) for z in spindle.raceway(b.inner_ring, b)], "outer": [_mm(z) for z in spindle.raceway(b.outer_ring, b)]},
     }
 

@@ -11,6 +11,7 @@ from thermospindle.model.errors import listed
 from thermospindle.report.text.grid import show_grid
 
 NOTABLE = 0.005
+PRODUCTS = "what the change itself mixes in is left out of them"
 """Of a stiffness, from which it is worth a sentence that the place of a cage changes it."""
 
 
@@ -41,6 +42,7 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     if values["bearings"] and turning and "ring_growth" not in values["effects"]["of_the_scene"] + list(values["effects"]["nothing_to_act_on"]):
         found.append("Rings do not grow by their own rotation; the effect ring_growth takes that in.")
     found += [_rollers(name, b) for name, b in values["bearings"].items() if b["kind"] == "roller row"]
+    found += [_passing(name, b["cage_spread"]) for name, b in values["bearings"].items() if b["kind"] == "ball row" and b["cage_spread"] > NOTABLE]
     if values["axial_load_N"]:
         found.append(_axial_load(values))
     found += _across(values, len(turning) > 1)
@@ -142,6 +144,14 @@ def _rollers(name: str, b: Mapping[str, Any]) -> str:
     )
     told = f"Rollers of {name}: {rows} {b['rollers']}, {b['roller_diameter_mm']:g} mm and {b['roller_length_mm']:g} mm long, {fit}; free along the axis."
     return told + spread
+
+
+def _passing(name: str, spread: float) -> str:
+    """Of a ball row that a load has displaced so far that its stiffness goes with the place of its cage."""
+    return (
+        f"Bearing {name}: its stiffness across changes by up to {100 * spread:.2g}% as its balls pass the load; taken is that with a ball at azimuth 0. "
+        f"Lines of runout are those of this stiffness, and {PRODUCTS}."
+    )
 
 
 def _by_way(values: list[float]) -> str:

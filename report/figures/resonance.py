@@ -28,6 +28,7 @@ CAUSES = {
     "ball waviness": "#1b7a4b",
     "ball size": "#3b0a6e",
     "cage unbalance": "#5c3a1e",
+    "varying compliance": "#e4572e",
 }
 HEAVY, THIN = 2.2, 0.9  # points, of modes and of lines
 SIZE = (9.6, 6.2)  # inches
@@ -224,12 +225,12 @@ def _named(line: Line) -> str:
     return f"{line.name} ({line.order})" if line.cause in ("inner waviness", "outer waviness") else line.name
 
 
-def _kind(line: Line) -> tuple[str, int, str, int]:
+def _kind(line: Line) -> tuple[object, ...]:
     """What lines of several bearings have in common."""
-    return line.cause, line.order, line.direction, line.whirl
+    return key(line)[1:]
 
 
-def _pair(c: Coincidence) -> tuple[tuple[str, int, str, int], int]:
+def _pair(c: Coincidence) -> tuple[tuple[object, ...], int]:
     return _kind(c.line), c.mode.number
 
 

@@ -152,8 +152,7 @@ def _same_line(crossed: Sequence[Coincidence]) -> list[list[Coincidence]]:
     one frequency they are one line of the spectrum."""
     groups: dict[tuple[Any, ...], list[Coincidence]] = {}
     for c in crossed:
-        line = c.line
-        alike = (line.cause, line.order, line.direction, line.whirl, c.mode.number, round(c.condition.temperature, 1)) if line.bearing and c.repeats else (id(c), len(groups))
+        alike = (*key(c.line)[1:], c.mode.number, round(c.condition.temperature, 1)) if c.line.bearing and c.repeats else (id(c), len(groups))
         groups.setdefault(alike, []).append(c)
     return list(groups.values())
 

@@ -133,7 +133,7 @@ def strongest(coincidences: Sequence[Coincidence]) -> list[Coincidence]:
     """Strongest first, of each cause, order, sense and mode only the bearing in which it is strongest."""
     best: dict[tuple, Coincidence] = {}
     for c in sorted(coincidences, key=lambda c: -c.strength):
-        best.setdefault((c.line.cause, c.line.order, c.line.direction, c.line.whirl, c.mode.number), c)
+        best.setdefault((*key(c.line)[1:], c.mode.number), c)
     return list(best.values())
 
 

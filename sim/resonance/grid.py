@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.model.bearing.kinematics import Line, lines, row_kinematics
-from thermospindle.model.bearing.pair import check_centred
 from thermospindle.model.built.drawn import PLAUSIBLE, drawn
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
@@ -72,7 +71,6 @@ class Grid:
     def __init__(self, spindle: Spindle, nominal: Condition, multiples: int, highest: float, imperfections: Imperfections | None):
         self.spindle, self.nominal, self.multiples = spindle, nominal, multiples
         first = operating_point(spindle, nominal)
-        check_centred(spindle, first.state, "a resonance map")
         self.ratio = speed_ratio(spindle)
         self.given, self.drawn_from = imperfections, None
         if imperfections is None and first.imperfections == Imperfections():

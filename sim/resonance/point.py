@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from thermospindle.model.bearing.kinematics import Line
+from thermospindle.model.bearing.kinematics import SIDEBANDS, Line
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.carrier import named, unbalanced
 from thermospindle.model.machine import Spindle
@@ -22,12 +22,12 @@ from thermospindle.sim.running.probes import hub_probes, speed_ratio
 
 UNIT_WAVE, UNIT_UNBALANCE = 1e-6, 1e-6  # m, kg m (1 g mm)
 
-Key = tuple[str, str, int, str, int]
-"""What a line is, at any condition: bearing, cause, order, direction, whirl."""
+Key = tuple[str, str, int, str, int, str]
+"""What a line is, at any condition: bearing, cause, order, direction, whirl, name."""
 
 
 def key(line: Line) -> Key:
-    return line.bearing, line.cause, line.order, line.direction, line.whirl
+    return line.bearing, line.cause, line.order, line.direction, line.whirl, line.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Exact:
     def unit_forces(self, bearing: str) -> Harmonics:
         """Of unit imperfections of one bearing, or of the rotor for the line of no bearing."""
         if bearing not in self._unit_forces:
-            whole = unit_imperfections(self.point.spindle, self.multiples)
+            whole = unit_imperfections(self.point.spindle, self.multiples, self.point.spindle.loaded_across)
             own = replace(whole, bearings={name: row for name, row in whole.bearings.items() if name == bearing})
             self._unit_forces[bearing] = harmonics(with_imperfections(self.point, own))
         return self._unit_forces[bearing]
@@ -104,8 +104,10 @@ def with_imperfections(point: OperatingPoint, imperfections: Imperfections) -> O
     return replace(point, spindle=replace(point.spindle, imperfections=imperfections), effects=effects)
 
 
-def unit_imperfections(spindle: Spindle, multiples: int) -> Imperfections:
-    """1 um of every wave that makes a line, on one ball 1 um of size and of every even wave, 1 g mm of unbalance of hub and cages."""
+def unit_imperfections(spindle: Spindle, multiples: int, displaced: bool) -> Imperfections:
+    """1 um of every wave that makes a line, on one ball 1 um of size and of every even wave, 1 g mm
+    of unbalance of hub and cages; with those of the sidebands of `displaced` rings."""
+    sides = range(1, SIDEBANDS + 1) if displaced else (1,)
 
     def waves(orders: Sequence[int]) -> tuple[Wave, ...]:
         return tuple(Wave(n, UNIT_WAVE, 0.0) for n in orders)
@@ -113,7 +115,7 @@ def unit_imperfections(spindle: Spindle, multiples: int) -> Imperfections:
     rows = {}
     for b in spindle.rolling:
         axial = [b.balls * k for k in range(1, multiples + 1)]
-        radial = waves([1, *sorted([n - 1 for n in axial] + [n + 1 for n in axial])])
+        radial = waves([*sides, *sorted(n + by * side for n in axial for side in sides for by in (-1, 1))])
         balls = (waves(range(2, 2 * multiples + 1, 2)), *[()] * (b.elements - 1))
         sizes = (UNIT_WAVE, *[0.0] * (b.elements - 1))
         rows[b.name] = RowImperfections(radial, waves(axial), radial, waves(axial), sizes, balls, UNIT_UNBALANCE)

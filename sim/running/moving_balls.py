@@ -21,6 +21,7 @@ from scipy.linalg import expm
 
 from thermospindle.model.bearing.ball_row import BallRow, respond
 from thermospindle.model.bearing.kinematics import Kinematics, row_kinematics
+from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.carrier import unbalance_carrier
 from thermospindle.model.rotor.chain import element_rows, matrices, motion_rows
@@ -34,10 +35,12 @@ class BallContacts:
     """The contacts of one row at given times: arrays (times, balls).
 
     `cos`, `sin` of the balls' azimuths; `radial`, `axial`: heights of the outer race less the inner one where the ball is (m);
-    `thick`: what the ball is too thick by between its two contacts, which lie opposite each other (m).
+    `thick`: what the ball is too thick by between its two contacts, which lie opposite each other (m). `displacement` (5,): of the
+    outer ring against the inner one where displacements are counted from.
     """
 
     row: BallRow
+    displacement: Array
     cos: Array
     sin: Array
     radial: Array
@@ -50,7 +53,7 @@ class BallContacts:
         `at` picks times; `factor` multiplies the imperfections.
         """
         row, c, s = self.row, self.cos[at], self.sin[at]
-        x, y, z, tilt_x, tilt_y = (moved[..., n, None] for n in range(5))
+        x, y, z, tilt_x, tilt_y = ((moved + self.displacement)[..., n, None] for n in range(5))
         across = x * c + y * s + factor * self.radial[at] - row.radial
         along = z + row.arm * (tilt_x * s - tilt_y * c) + factor * self.axial[at] + row.axial
         length = np.hypot(across, along)
@@ -60,8 +63,9 @@ class BallContacts:
         return np.stack([np.sum(f, axis=-1) for f in (force_r * c, force_r * s, force_z, *moments)], axis=-1)
 
 
-def ball_contacts(row: BallRow, kin: Kinematics, own: RowImperfections, time: Array) -> BallContacts:
+def ball_contacts(bearing: BearingState, kin: Kinematics, own: RowImperfections, time: Array) -> BallContacts:
     """The contacts of a row at `time` (n,) s: every profile read off where the ball is."""
+    row, displacement = bearing.row, np.array(bearing.displacement or (0.0,) * 5)
     t = time[:, None]
     place = 2 * np.pi * np.arange(row.balls) / row.balls + kin.cage * t
     inner, outer = place - kin.inner * t, place - kin.outer * t
@@ -73,7 +77,7 @@ def ball_contacts(row: BallRow, kin: Kinematics, own: RowImperfections, time: Ar
         thick[:, j] += _height(waves, angle) + _height(waves, angle + np.pi)
     radial = _height(own.outer_radial, outer) - _height(own.inner_radial, inner)
     axial = _height(own.outer_axial, outer) - _height(own.inner_axial, inner)
-    return BallContacts(row, np.cos(place), np.sin(place), radial, axial, thick)
+    return BallContacts(row, displacement, np.cos(place), np.sin(place), radial, axial, thick)
 
 
 def _height(waves: Sequence[Wave], azimuth: Array) -> Array:
@@ -101,11 +105,11 @@ def run_moving_balls(
     scale = np.array(factors, float)[:, None]
     rows, stiffness = [element_rows(chain, e) for e in elements], [e.stiffness for e in elements]
     kin = row_kinematics(point.spindle, point.state)
-    contacts = [ball_contacts(b.row, kin[b.name], own.row(b.name), time) for b in point.state.bearings]
-    held = [respond(b.row).force for b in point.state.bearings]
+    contacts = [ball_contacts(b, kin[b.name], own.row(b.name), time) for b in point.state.bearings]
+    held = [respond(b.row, np.array(b.displacement or (0.0,) * 5)).force for b in point.state.bearings]
     given = scale[:, :, None] * _unbalance_forces(point, own, kin, time)
     for b, bearing in enumerate(point.state.bearings):  # damping of the loads that imperfections alone would make
-        halves = ball_contacts(bearing.row, kin[bearing.name], own.row(bearing.name), np.append(time - step / 2, time[-1] + step / 2))
+        halves = ball_contacts(bearing, kin[bearing.name], own.row(bearing.name), np.append(time - step / 2, time[-1] + step / 2))
         lag = float(elements[b].damping[2, 2] / stiffness[b][2, 2])
         for f, factor in enumerate(factors):
             given[f] -= lag * np.diff(halves.force(slice(None), np.zeros(5), factor), axis=0) / step @ rows[b]
@@ -123,7 +127,8 @@ def run_moving_balls(
     inverse = np.linalg.inv(linear.mass)
     state_matrix[n:] = np.hstack([-inverse @ linear.stiffness, -inverse @ linear.damping])
     carry, first, second = _exponentials(state_matrix, np.vstack([np.zeros((n, n)), inverse]), step)
-    state = scale * _steady_start(point, own)
+    perfect = _steady_start(point, Imperfections())
+    state = perfect + scale * (_steady_start(point, own) - perfect)
     displacement = np.empty((len(factors), steps + 1, n))
     displacement[:, 0] = state[:, :n]
     before = force = remainder(0, state[:, :n])
@@ -145,10 +150,15 @@ def difference_from_linear(
     turning = next(b.name for b in point.chain.bodies if b.turns)
     columns = [point.chain.dofs.index((turning, move)) for move in ("x", "y", "z")]
     late = time > settle
+    made, perfect = (linear_motion(point, which, time[late])[:, columns] for which in (own, Imperfections()))
+    linear = [perfect + f * (made - perfect) for f in factors]
+    return np.array([_rms(m[late][:, columns] - one) / _rms(one) for m, one in zip(moved, linear, strict=True)])
+
+
+def linear_motion(point: OperatingPoint, own: Imperfections, time: Array) -> Array:
+    """Displacement (n, dofs) m, rad of the chain in the linear model at `time` (n,) s."""
     forces = at_speed(excitation(point, own), 1.0)
-    phasors = response(point, forces)[:, columns]
-    linear = np.real(np.exp(2j * np.pi * np.outer(time[late], forces.frequency)) @ phasors)
-    return np.array([_rms(m[late][:, columns] - f * linear) / (f * _rms(linear)) for m, f in zip(moved, factors, strict=True)])
+    return np.asarray(np.real(np.exp(2j * np.pi * np.outer(time, forces.frequency)) @ response(point, forces)))
 
 
 def _rms(values: Array) -> float:

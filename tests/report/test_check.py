@@ -13,14 +13,12 @@ from matplotlib.patches import Rectangle
 from tests.conftest import ROOT
 from tests.report.checked import SCENES, checked, without
 from thermospindle.cli import main
-from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.check.drawing import drawing
 from thermospindle.report.check.understood import arrangement
 from thermospindle.report.check.words import of_words
 from thermospindle.sim.operating import operating_point
-from thermospindle.testing import assert_margin
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -214,12 +212,6 @@ def test_shares_of_a_radial_load_add_up(tmp_path: Path, capsys: pytest.CaptureFi
     assert np.sum([b["radial_force_N"] for b in found["bearings"].values()], axis=0) == pytest.approx([300.0, -100.0], rel=1e-6)
     assert main(["check", str(tmp_path)]) == 0
     assert "External radial load 300, -100 N" in capsys.readouterr().out
-    for verb in ("runout", "map"):
-        assert main([verb, str(tmp_path), "--speed", "3000"]) == 2
-        assert f"{tmp_path / 'spindle.toml'}: radial_load_N = [300, -100]: " in (said := capsys.readouterr().err)
-        assert "is for centred rings" in said
-    with pytest.raises(BadInput, match="assert_margin is for centred rings"):  # whose lines these are
-        assert_margin(tmp_path, mode=1, speed_rpm=3000, at_least_percent=0.1)
 
 
 def test_a_joint_that_differs_along_x_and_y_is_shown_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:

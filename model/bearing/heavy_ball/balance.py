@@ -216,12 +216,14 @@ def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
 
 class Driven(NamedTuple):
     """What a ball that orbits with the cage has to do with its speed: its own by rolling (rad/s), the derivatives of that
-    by the outer groove's centre (2,) and by the cage's speed, and of the force on the outer ring (2,) by the cage's speed."""
+    by the outer groove's centre (2,) and by the cage's speed, of the force on the outer ring (2,) by the cage's speed, and
+    of its own speed by its centre (2,) while both grooves stand."""
 
     speed: float
     by_line: Vector
     by_cage: float
     force_by_cage: Vector
+    by_centre: Vector
 
 
 def driven(ball: HeavyBall, here: Balance, line: Vector) -> Driven:
@@ -244,7 +246,25 @@ def driven(ball: HeavyBall, here: Balance, line: Vector) -> Driven:
         (by_gap[0] + by_centre[0] * follows[0] + by_centre[1] * follows[2], by_gap[1] + by_centre[0] * follows[1] + by_centre[1] * follows[3]),
         by_centre[0] * moved_r + by_centre[1] * moved_z,
         (on_outer[0] - pushed_r, on_outer[1] - pushed_z),
+        by_centre,
     )
+
+
+def thicker(ball: HeavyBall, here: Balance, rolls: Driven, line: Vector) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """What a ball, settled as in `driven`, does that is thicker at its inner, and at its outer contact, while its cage keeps its speed: derivatives
+    of the force on the outer ring, r and z (N/m), and of its own speed by rolling (rad/s m). The contact that is pressed
+    pushes the ball, whose centre gives way by (S + G)^-1 of that."""
+    s, g, (cr, cz), gap = here.by_inner, here.by_line, here.centre, (line[0] - here.centre[0], line[1] - here.centre[1])
+    inverse = _inverse((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
+    inner = -1.5 * ball.inner_constant ** (2 / 3) * here.inner ** (1 / 3) / hypot(cr, cz)
+    outer = 1.5 * ball.outer_constant ** (2 / 3) * here.outer ** (1 / 3) / hypot(*gap)
+    towards = outer * gap[0], outer * gap[1]
+    found = []
+    for push, direct in (((inner * cr, inner * cz), (0.0, 0.0)), (towards, towards)):
+        moved = _times(inverse, push)
+        held = _times(here.by_outer, moved)
+        found.append((direct[0] - held[0], direct[1] - held[1], rolls.by_centre[0] * moved[0] + rolls.by_centre[1] * moved[1]))
+    return found[0], found[1]
 
 
 def _contact(vector: Vector, unloaded: float, constant: float) -> tuple[float, Vector, float, float]:

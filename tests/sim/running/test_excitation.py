@@ -17,7 +17,9 @@ from thermospindle.sim.effects import by_name
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.structure.shaft_bending import moved
 from thermospindle.sim.operating import OperatingPoint, operating_point
-from thermospindle.sim.running.excitation import chain_response, contact_pushes, excitation, free_displacements, harmonics, response
+from thermospindle.sim.running.excitation import chain_response, excitation, harmonics, response
+from thermospindle.sim.running.pulls import pulls_of
+from thermospindle.sim.running.rows import free_displacements
 
 
 def both(**own) -> Imperfections:
@@ -79,8 +81,8 @@ def heavy_row(spindle):
 def test_thick_balls_move_the_ring_as_the_equilibrium_says(spindle, contact, heavy):
     """All balls too thick at one contact: the axial displacement under the same load, solved without linearising."""
     row = heavy_row(spindle) if heavy else replace(heavy_row(spindle), inertia=None)
-    push = dict(zip(("inner", "outer"), contact_pushes(row), strict=True))[contact]
-    moved = -row.balls * push[1] / respond(row).tangent[2, 2]
+    pull = pulls_of(row).by[0][2, {"inner": 2, "outer": 3}[contact]]
+    moved = row.balls * pull.real / respond(row).tangent[2, 2]
     held = respond(row).force
     thick = 2e-9
     key = f"{contact}_length"
@@ -92,7 +94,8 @@ def test_thick_balls_move_the_ring_as_the_equilibrium_says(spindle, contact, hea
 def test_a_thick_ball_presses(spindle):
     """Light balls: the push is the ball's stiffness along the contact line."""
     bearing = operating_point(spindle, Condition(20.0)).state.bearing("upper")
-    inner, outer = contact_pushes(bearing.row)
+    pulls = pulls_of(bearing.row)
+    inner, outer = ((-2 * pulls.by[1][0, which].real, -pulls.by[0][2, which].real) for which in (2, 3))  # r, z
     assert np.hypot(*inner) == pytest.approx(bearing.ball_stiffness, rel=1e-12)
     assert np.arctan2(abs(inner[1]), -inner[0]) == pytest.approx(bearing.contact_angle, rel=1e-12)
     assert np.array_equal(inner, outer)

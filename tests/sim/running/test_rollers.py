@@ -15,7 +15,7 @@ from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running.excitation import harmonics
-from thermospindle.sim.running.rollers import free_displacements
+from thermospindle.sim.running.rows import free_displacements
 from thermospindle.sim.running.runout import runout
 
 SPEED = 1500 * RPM

@@ -283,7 +283,7 @@ def test_forces_of_moving_balls_are_those_of_the_row_when_they_stand(spindle):
 
     point = at(spindle, Imperfections())
     bearing, kin = point.state.bearing("upper"), row_kinematics(point.spindle, point.state)["upper"]
-    contacts = ball_contacts(bearing.row, kin, RowImperfections(), np.array([0.0, 2 * np.pi / 10 / kin.cage]))
+    contacts = ball_contacts(bearing, kin, RowImperfections(), np.array([0.0, 2 * np.pi / 10 / kin.cage]))
     moved = np.array([0.2e-6, -0.1e-6, 0.3e-6, 2e-5, -3e-5])
     for k in (0, 1):  # a ball's pitch later every ball stands where its neighbour stood
         assert contacts.force(k, moved) == pytest.approx(respond(bearing.row, moved).force, rel=1e-9)

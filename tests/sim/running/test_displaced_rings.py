@@ -1,0 +1,221 @@
+"""Runout of a spindle whose rings a radial load or its weight displaces, against balls that move in time without small
+amplitudes, forces of the whole row at every place of its cage, and rings moved as a whole."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from thermospindle.cli import main
+from thermospindle.model.bearing import ball_row, roller
+from thermospindle.model.bearing.ball_row import BallInertia, BallRow
+from thermospindle.model.bearing.kinematics import VARYING, lines, row_kinematics
+from thermospindle.model.bearing.roller import RollerRow, line_constant
+from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.machine import Condition, RadialLoad, Spindle
+from thermospindle.model.scene.reading import load
+from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
+from thermospindle.sim.operating import OperatingPoint, operating_point
+from thermospindle.sim.resonance.map import resonance_map
+from thermospindle.sim.running.excitation import excitation
+from thermospindle.sim.running.moving_balls import linear_motion, run_moving_balls
+from thermospindle.sim.running.pulls import pulls_of
+from thermospindle.sim.running.rows import cage_spread, free_displacements
+from thermospindle.sim.running.runout import runout
+from thermospindle.testing import assert_margin
+
+SPIN = 7200 * RPM
+ASIDE = np.array([2.5e-7, -1e-7, 0.5e-7, 2e-5, 1e-5])  # m, rad
+LIGHT = BallRow(10, 4e-5, 4e-5, 3e-5, 2.55e-5, 1.1e10, 1.2e10, 3e-3)
+HEAVY = replace(LIGHT, inertia=BallInertia(1e-3, 6e-3, 7800.0, 0.0, 20 * SPIN))
+ROLLERS = RollerRow(16, 9e-3, line_constant(9e-3), -2e-6, (-7e-3, 7e-3))
+ROWS = pytest.mark.parametrize("row", [LIGHT, HEAVY, ROLLERS], ids=["balls", "heavy balls", "rollers"])
+
+
+def pushed(spindle: Spindle, newton: float) -> OperatingPoint:
+    aside = replace(spindle, radial_loads=(RadialLoad((newton, 0.3 * newton), 0.008, ""),), imperfections=Imperfections())
+    return operating_point(aside, Condition(20.0, SPIN))
+
+
+def hub(point: OperatingPoint, moved: Array) -> Array:
+    """Motion (n, 3) of the turning body about its mean: the load's own place is that with a ball at azimuth 0."""
+    turning = next(b.name for b in point.chain.bodies if b.turns)
+    own = moved[:, [point.chain.dofs.index((turning, move)) for move in "xyz"]]
+    return np.asarray(own - own.mean(axis=0))
+
+
+# ---------------------------------------------------------------- balls that move
+
+
+@pytest.mark.parametrize(("newton", "within"), [(10.0, 3e-3), (30.0, 0.01)])
+def test_moving_balls_do_what_the_lines_say(spindle, newton, within):
+    """A tenth of drawn imperfections under 10 N, which presses balls with 2.5 to 5.4 N, and 30 N, which nearly lets one go."""
+    point, own = pushed(spindle, newton), drawn(spindle, 1)
+    time, [moved] = run_moving_balls(point, own, 0.03, (0.1,))
+    late = time > 0.02
+    perfect, made = (linear_motion(point, which, time[late]) for which in (Imperfections(), own))
+    linear = hub(point, perfect + 0.1 * (made - perfect))
+    assert hub(point, moved[late]) == pytest.approx(linear, abs=within * np.abs(linear).max())
+    centred = replace(point, state=replace(point.state, bearings=tuple(replace(b, displacement=()) for b in point.state.bearings)))
+    without = hub(point, 0.1 * linear_motion(centred, own, time[late]))
+    assert np.abs(without - linear).max() > 5 * within * np.abs(linear).max()  # and not what they say of centred rings
+
+
+def test_a_perfect_row_moves_as_its_balls_pass(spindle):
+    """Under 70 N four of ten balls carry nothing: ten times the cage and its multiples alone, as far as a constant stiffness knows, 84 % of it."""
+    point = pushed(spindle, 70.0)
+    time, [moved] = run_moving_balls(point, Imperfections(), 0.04, (1.0,))
+    late = time > 0.02
+    linear, real = hub(point, linear_motion(point, Imperfections(), time[late])), hub(point, moved[late])
+    assert np.sqrt(np.mean((real - linear) ** 2) / np.mean(real**2)) < 0.25
+    cage = row_kinematics(point.spindle, point.state)["lower"].cage / (2 * np.pi)
+    own = [x for x in excitation(point).line if x.bearing == "lower"]
+    assert {(x.cause, x.whirl) for x in own} == {(VARYING, 0)}
+    assert sorted({round(x.frequency / cage, 9) for x in own}) == [10.0, 20.0, 30.0]
+    assert {x.name for x in own} == {"10 fc", "20 fc", "30 fc"}
+    assert cage_spread(point.state.bearing("lower")) > 0.05
+
+
+# ---------------------------------------------------------------- a row as a whole
+
+
+def whole(row: BallRow | RollerRow, q: Array, turn: float) -> Array:
+    """Force (5,) that holds the outer ring with the first element at azimuth `turn`."""
+    if isinstance(row, RollerRow):
+        return roller.with_cage_at(row, q, turn)[0]
+    c, s = np.cos(turn), np.sin(turn)
+    turned = np.eye(5)
+    turned[:2, :2] = turned[3:, 3:] = [[c, s], [-s, c]]
+    return np.asarray(turned.T @ ball_row.respond(row, turned @ q).force)
+
+
+@ROWS
+def test_the_load_of_a_perfect_row_changes_with_the_place_of_its_cage(row):
+    """Harmonics over the turn of the cage of the force on the whole row, one place after another."""
+    elements = row.rollers if isinstance(row, RollerRow) else row.balls
+    aside = 6 * ASIDE if isinstance(row, RollerRow) else 8 * ASIDE  # so far that some carry nothing
+    turns = 2 * np.pi / elements * np.arange(256) / 256
+    force = np.array([whole(row, aside, turn) for turn in turns])
+    perfect = pulls_of(row, tuple(aside)).perfect
+    for k in (1, 2):
+        seen = np.fft.fft(-force, axis=0)[k] / 256
+        assert elements * perfect[k * elements] == pytest.approx(seen, rel=0.05, abs=0.02 * np.abs(seen).max())
+
+
+@pytest.mark.parametrize("contact", ["inner", "outer"])
+@ROWS
+def test_elements_all_too_thick_do_what_the_row_says(row, contact):
+    """The force on the outer ring, by central differences of the whole row with every element thicker."""
+    q, h = tuple(ASIDE), 1e-10
+
+    def held(thick: float) -> Array:
+        if isinstance(row, RollerRow):
+            return roller.respond(replace(row, clearance=row.clearance - 2 * thick), ASIDE).force
+        return ball_row.respond(replace(row, **{f"{contact}_length": getattr(row, f"{contact}_length") - thick}), ASIDE).force
+
+    expected = -(held(h) - held(-h)) / (2 * h)
+    pull = pulls_of(row, q).by[0]
+    found = row.rollers * pull.sum(axis=1) if isinstance(row, RollerRow) else row.balls * pull[:, {"inner": 2, "outer": 3}[contact]]
+    assert found.real == pytest.approx(expected, rel=1e-5, abs=1e-6 * np.abs(expected).max())
+    assert np.abs(found.imag).max() < 1e-9 * np.abs(found).max()
+
+
+@ROWS
+def test_a_race_that_is_displaced_as_a_whole_takes_its_ring_along(row):
+    """Order 1 of a race, radial and axial, felt with every harmonic at once: the row's stiffness times that displacement."""
+    q, elements = tuple(ASIDE), row.rollers if isinstance(row, RollerRow) else row.balls
+    pulls = pulls_of(row, q)
+    tangent = roller.respond(row, ASIDE).tangent if isinstance(row, RollerRow) else ball_row.respond(row, ASIDE).tangent
+    along_x = sum(elements / 2 * pulls.by[m] for m in (-1, 1))  # of what is cos(azimuth)
+    if isinstance(row, RollerRow):
+        assert along_x.sum(axis=1).real == pytest.approx(tangent[:, 0], rel=1e-3, abs=1e-4 * tangent[0, 0])
+    else:
+        assert -along_x[:, 0].real == pytest.approx(tangent[:, 0], rel=1e-6, abs=1e-7 * tangent[0, 0])
+        assert -along_x[:, 1].real * -row.arm == pytest.approx(tangent[:, 4], rel=1e-6, abs=1e-7 * np.abs(tangent[:, 4]).max())
+        assert -elements * pulls.by[0][:, 1].real == pytest.approx(tangent[:, 2], rel=1e-6, abs=1e-7 * tangent[2, 2])
+
+
+# ---------------------------------------------------------------- lines
+
+
+def test_sidebands_stand_where_the_frames_say(spindle):
+    """Race waves of any order s beside k Z turn with k Z (f_race - f_cage) + s f_race, ball waves with 2 k f_ball + s f_cage, sizes with s f_cage."""
+    point = pushed(spindle, 30.0)
+    kin = row_kinematics(point.spindle, point.state)["upper"]
+    assert kin.displaced
+    ring, cage, ball = (abs(x) / (2 * np.pi) for x in (kin.outer, kin.cage, kin.spin))
+    found = {(x.name, x.direction): x.frequency for x in lines(point.spindle, {name: kin for name in ("upper", "lower")}, SPIN, 2) if x.bearing == "upper"}
+    expected = {"2 fc": 2 * cage, "10 (fo-fc) + 2 fo": 10 * (ring - cage) + 2 * ring, "20 (fo-fc) - 2 fo": 20 * (ring - cage) - 2 * ring, "2 fo": 2 * ring, "2 fb - 2 fc": 2 * ball - 2 * cage, "10 fc": 10 * cage}
+    for name, frequency in expected.items():
+        assert found[name, "radial"] == found[name, "axial"] == pytest.approx(frequency, rel=1e-12)
+    own = excitation(point, Imperfections(bearings={"upper": RowImperfections(outer_radial=(Wave(12, 1e-9, 0.0),), ball_waves=((Wave(2, 1e-9, 0.0),), *[()] * 9))}))
+    made = {x.name for x in own.line if x.bearing == "upper" and x.cause != VARYING}
+    assert {"10 (fo-fc) + 2 fo", "2 fb - 2 fc", "2 fb + 3 fc"} <= made
+
+
+def test_what_is_weak_is_left_out_and_what_is_centred_has_no_sidebands(spindle):
+    own = RowImperfections(outer_radial=tuple(Wave(n, 1e-8, 0.1 * n) for n in range(1, 42)))
+    names = []
+    for newton in (1e-6, 1.0, 30.0):
+        point = pushed(spindle, newton)
+        found = free_displacements(point.state.bearing("upper"), row_kinematics(point.spindle, point.state)["upper"], own)
+        size = [np.linalg.norm(point.state.bearing("upper").stiffness @ moved) for _, moved in found]
+        assert min(size) > 1e-6 * max(size)
+        names.append(len(found))
+    assert names[0] == len(free_displacements(operating_point(spindle, Condition(20.0, SPIN)).state.bearing("upper"), row_kinematics(point.spindle, point.state)["upper"], own))
+    assert names[0] < names[1] < names[2]
+
+
+# ---------------------------------------------------------------- the verbs
+
+
+@pytest.fixture(scope="module")
+def lying(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lying")
+    text = (ROOT / "scenes" / "hdd_2003" / "spindle.toml").read_text(encoding="utf-8")
+    key = "nominal_speed_rpm = 7200.0"
+    assert key in text
+    loads = "radial_load_N = [8.0, -2.0]\nradial_load_z_mm = 8.0\ngravity_m_per_s2 = [0.0, -9.81]"
+    (folder / "spindle.toml").write_text(text.replace(key, f"{key}\n{loads}"), encoding="utf-8")
+    return folder
+
+
+def test_runout_of_a_spindle_that_lies_has_in_mujoco_what_the_lines_say(lying):
+    spindle = load(lying)
+    found = runout(operating_point(replace(spindle, imperfections=drawn(spindle, 1)), Condition(20.0, SPIN)), seconds=0.2, path="simulated")
+    strong = [line for line in found.lines if line.amplitude > 0.03 * found.lines[0].amplitude]
+    assert len(strong) > 8
+    for line in strong:
+        assert line.amplitude == pytest.approx(line.predicted, rel=2e-3)
+
+
+def test_runout_tells_where_stiffness_changes(lying, capsys):
+    assert main(["runout", str(lying), "--path", "linear", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert 0 < answer["stiffness_changes"]["upper"] < 1e-3
+    assert main(["runout", "hdd_2003", "--path", "linear", "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)["stiffness_changes"].values()) == {0.0}
+
+
+def test_a_map_has_the_sidebands(lying):
+    spindle = load(lying)
+    found = resonance_map(spindle, [20.0, 30.0], np.linspace(0, 14400 * RPM, 9).tolist(), Condition(20.0, SPIN))
+    names = {c.line.name for c in found.coincidences}
+    assert any("2 fo" in name or "2 fc" in name for name in names)
+    assert all(np.isfinite(c.strength) and np.isfinite(c.nrro) for c in found.coincidences)
+    assert len({(c.line.bearing, c.line.cause, c.line.name, c.line.direction, c.line.order, c.mode.number, c.condition) for c in found.coincidences}) == len(found.coincidences)
+
+
+def test_a_margin_counts_sidebands(lying):
+    with pytest.raises(AssertionError, match=r"4 fb - 2 fc"):
+        assert_margin(lying, mode=1, speed_rpm=6004, at_least_percent=0.2, temperatures_C=[20.0])
+
+
+def test_ball_by_ball_elements_and_runout_campaigns_are_still_for_centred_rings(lying, capsys):
+    assert main(["runout", str(lying), "--element", "ball-by-ball"]) == 2
+    assert "radial_load_N = [8, -2]: --element ball-by-ball is for centred rings" in capsys.readouterr().err
