@@ -28,7 +28,7 @@ CAUSES = {
     "ball waviness": "#1b7a4b",
     "ball size": "#3b0a6e",
     "cage unbalance": "#5c3a1e",
-    "varying compliance": "#e4572e",
+    "varying compliance": "#3d42cc",
 }
 HEAVY, THIN = 2.2, 0.9  # points, of modes and of lines
 SIZE = (9.6, 6.2)  # inches
