@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, key_of
-from thermospindle.model.bearing.pair import check_centred
 from thermospindle.model.built.drawn import GRADES, held_over
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.carrier import named, permissible_unbalance, unbalanced
 from thermospindle.model.drawing.measuring import Point
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.types import Array, ComplexArray
@@ -87,11 +87,18 @@ def _all(spindle: Spindle, at: Sequence[OperatingPoint], probes: Sequence[Sequen
 
 def phasors(point: OperatingPoint, imperfections: Imperfections, probes: Sequence[Point]) -> dict[Key, ComplexArray]:
     """Phasors (probes,) m of every line that imperfections would excite at a point."""
-    check_centred(point.spindle, point.state, "comparing runout tests with the model")  # sidebands and a perfect row's lines are no sources of their own
+    _check_centred(point.spindle)
     forces = at_speed(excitation(point, imperfections), 1.0)
     moved = chain_response(point.chain, forces)
     rows = np.array([np.array(p.direction) @ motion_rows(point.chain, p.body, p.position)[:3] for p in probes])
     return {key_of(line): rows @ one for line, one in zip(forces.line, moved, strict=True)}
+
+
+def _check_centred(spindle: Spindle) -> None:
+    """`BadInput` where radial loads or weight displace rings: sidebands, and what a perfect row does there, are no sources of their own."""
+    if spindle.loaded_across:
+        told = spindle.radial_loads[0].told if spindle.radial_loads else f"gravity_m_per_s2 = [{spindle.gravity[0]:g}, {spindle.gravity[1]:g}]"
+        raise BadInput(f"{spindle.file or spindle.name}: {told}: runout tests are compared with centred rings alone, and this displaces them; take it out, or leave the runout tests out")
 
 
 def scatter(spindle: Spindle, point: OperatingPoint, probes: Sequence[Point]) -> dict[Key, Array]:

@@ -111,16 +111,6 @@ class PairState:
         return named(name, self.bearings, "ball bearing")
 
 
-def check_centred(spindle: Spindle, state: PairState, what: str) -> None:
-    """`BadInput` where radial loads or weight displace rings, for `what` takes rows with centred ones."""
-    if any(b.displacement for b in state.bearings):
-        told = spindle.radial_loads[0].told if spindle.radial_loads else f"gravity_m_per_s2 = [{spindle.gravity[0]:g}, {spindle.gravity[1]:g}]"
-        raise BadInput(
-            f"{spindle.file or spindle.name}: {told}: {what} is for centred rings, and this displaces them; take it out, or ask what knows displaced rings: "
-            "linear elements, in modes, table, static, impact, runout and map"
-        )
-
-
 def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMotion]) -> PairState:
     """Axial equilibrium of all rows under the thermal ring `motions` (by bearing name).
 

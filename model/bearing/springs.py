@@ -12,31 +12,38 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from thermospindle.model.bearing.ball_row import centre_line, respond
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.types import Array
 
 
 @dataclass(frozen=True)
 class BallSprings:
-    """Springs of one row: ends (balls, 3) in m at the loaded state, and force = a x + b x^2 + c x^3 beyond `rest` (m)."""
+    """Springs of one row: ends (balls, 3) in m at the loaded state, and force = a x + b x^2 + c x^3
+    beyond `rest` (m), `polynomial` (balls, 3) of a, b, c."""
 
     inner: Array
     outer: Array
     rest: float
-    polynomial: tuple[float, float, float]
+    polynomial: Array
+
+
+LIGHTEST = 0.1
+"""Of the largest deformation of a row under a radial load, at which balls that are pressed by less, or not at all, are expanded."""
 
 
 def ball_springs(state: BearingState) -> BallSprings:
     """The springs of a bearing at its operating point; a ball that has lost contact there has a spring that is slack."""
-    row = state.row
+    row, q = state.row, np.array(state.displacement or (0.0,) * 5)
     c, s = np.cos(row.azimuths), np.sin(row.azimuths)
-
-    def circle(radius: float, z: float) -> Array:
-        return np.stack([radius * c, radius * s, np.full_like(c, z)], axis=1)
-
-    inner = circle(row.arm + row.radial / 2, state.z - row.axial / 2)
-    outer = circle(row.arm - row.radial / 2, state.z + row.axial / 2)
-    return BallSprings(inner, outer, row.unloaded_distance, hertz_polynomial(row.constant, state.deformation))
+    radius = row.arm + row.radial / 2
+    inner = np.stack([radius * c, radius * s, np.full_like(c, state.z - row.axial / 2)], axis=1)
+    r, z = centre_line(row, q).T
+    deformation = np.full(row.balls, state.deformation)
+    if any(q):
+        each = respond(row, q, respond(row).rolled).deformation
+        deformation = np.maximum(each, LIGHTEST * each.max())
+    return BallSprings(inner, inner + np.stack([r * c, r * s, z], axis=1), row.unloaded_distance, np.array([hertz_polynomial(row.constant, x) for x in deformation]))
 
 
 def hertz_polynomial(constant: float, deformation: float) -> tuple[float, float, float]:
@@ -57,8 +64,7 @@ def tangent(springs: BallSprings, inner_centre: float, outer_centre: float) -> A
     MuJoCo's hinges do; second derivatives of the lengths are exact.
     """
     hessian = np.zeros((10, 10))
-    a, b, c = springs.polynomial
-    for p, q in zip(springs.inner, springs.outer, strict=True):
+    for p, q, (a, b, c) in zip(springs.inner, springs.outer, springs.polynomial, strict=True):
         line = q - p
         length = float(np.linalg.norm(line))
         e = line / length

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from thermospindle.model.bearing.pair import BearingState, PairState, check_centred
+from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.bearing.springs import ball_springs, tangent
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Element, Matrices, RotorBase, element_rows, lost, matrices, point_row, rotor_base
@@ -27,6 +27,8 @@ from thermospindle.model.types import Array
 
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "tilt_x": (1, 0, 0), "tilt_y": (0, 1, 0)}
 LEAST_INERTIA = 4e-15  # kg m2, of a body in two: MuJoCo refuses anything below 1e-15
+DEAD_LOAD = "dead load"
+"""How the names of the actuators begin that hold loaded balls where they are."""
 CARRIER_SHARE = 1e-9  # of the turning body's inertia, left on the carrier because MuJoCo wants every moving body to have some
 
 
@@ -39,8 +41,6 @@ def spec(spindle: Spindle, state: PairState, element: str = "linear", looks: boo
     if element not in ELEMENTS:
         raise ValueError(f"bearing element {element!r} is unknown; allowed are {', '.join(ELEMENTS)}")
     chain = chain or rotor_base(spindle, state)
-    if element == "ball-by-ball":
-        check_centred(spindle, state, "--element ball-by-ball")
     slides = {e.name for e in chain.elements if e.slides}  # balls of a ring on a spring stay one element, which knows its ring
     balls = {b.name: b for b in state.bearings if b.name not in slides} if element == "ball-by-ball" else {}
     out = chain_spec(chain, spindle.hammer.step, stiff=tuple(e.name for e in chain.elements if e.name not in balls))
@@ -157,7 +157,7 @@ def _add_balls(out: mujoco.MjSpec, chain: RotorBase, bearing: BearingState, elem
             holder.add_site(name=f"{bearing.name}.{side}{j}", pos=[x, y, z - body.z], size=[1e-4] * 3, group=4)
     for j in range(len(springs.inner)):
         tendon = out.add_tendon(name=f"{bearing.name}.ball{j}", width=1e-5)
-        tendon.springlength, tendon.stiffness = [0, springs.rest], list(springs.polynomial)
+        tendon.springlength, tendon.stiffness = [0, springs.rest], springs.polynomial[j].tolist()
         tendon.wrap_site(f"{bearing.name}.inner{j}")
         tendon.wrap_site(f"{bearing.name}.outer{j}")
     both = [i for name in (element.a, element.b) for i, (body, _) in enumerate(chain.dofs) if body == name]
@@ -176,7 +176,7 @@ def _add_dead_loads(out: mujoco.MjSpec) -> None:
     for i, force in enumerate(data.qfrc_passive):
         if abs(force) > 1e-9 * largest:
             name = model.joint(model.dof_jntid[i]).name
-            load = out.add_actuator(name=f"dead load {name}", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
+            load = out.add_actuator(name=f"{DEAD_LOAD} {name}", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
             load.biastype = mujoco.mjtBias.mjBIAS_AFFINE
             load.gainprm[0], load.biasprm[0] = 0.0, -force
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from thermospindle.model.carrier import unbalance_carrier
 from thermospindle.model.errors import BadInput
-from thermospindle.model.rotor.mjcf import joint_names, spin_dofs, spin_speeds
+from thermospindle.model.rotor.mjcf import DEAD_LOAD, joint_names, spin_dofs, spin_speeds
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.hammer.test import check_step
 from thermospindle.sim.operating import OperatingPoint
@@ -169,14 +169,15 @@ def _every(points: Sequence[OperatingPoint], step: float, sample_rate: float) ->
 
 
 def running_model(point: OperatingPoint, element: str = "linear", step: float | None = None) -> mujoco.MjModel:
-    """The MuJoCo model of a running spindle, without hammers and vibrometers: mass centre and inertia of the turning body nearest the
+    """The MuJoCo model of a running spindle, without hammers and vibrometers, with the dead loads that balls by themselves need: mass centre and inertia of the turning body nearest the
     unbalance (of a flexible shaft, a segment) off the axis by it, and a flywheel's armature on the spin.
 
     A static unbalance U at height h above the mass centre moves it by U / m and adds the product of inertia U h; a couple W adds W.
     """
     spec = point.spec(element)
     spec.option.timestep = step or point.spindle.hammer.step
-    for thing in (*spec.sensors, *spec.actuators, *(t for t in spec.tendons if t.name in {f"point{p.node}" for p in point.spindle.points})):
+    hammers = [a for a in spec.actuators if not a.name.startswith(DEAD_LOAD)]
+    for thing in (*spec.sensors, *hammers, *(t for t in spec.tendons if t.name in {f"point{p.node}" for p in point.spindle.points})):
         spec.delete(thing)
     own, turning = point.imperfections, [b for b in point.chain.bodies if b.turns]
     for body in turning:

@@ -16,7 +16,6 @@ from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.carrier import load_carrier
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.machine import Condition, RadialLoad, Spindle
-from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import matrices, motion_rows, point_row, rotor_base
 from thermospindle.model.rotor.loaded import loaded, motion
 from thermospindle.model.rotor.static import static
@@ -283,13 +282,6 @@ def test_a_load_that_nothing_bears_is_refused() -> None:
     free = replace(spindle, roller_bearings=(), linear_bearings=spindle.linear_bearings)
     with pytest.raises(NoEquilibrium, match="nothing bears the load across the axis"):
         under(free, (1.0, 0.0), 0.0)
-
-
-def test_balls_by_themselves_are_for_centred_rings(pair: Spindle) -> None:
-    pushed, state = under(pair, (1.0, 0.0), 0.02)
-    with pytest.raises(BadInput, match=r"radial_load_N = \[1, 0\]: --element ball-by-ball is for centred rings"):
-        mjcf.spec(pushed, state, "ball-by-ball")
-    assert mjcf.spec(pushed, state, "linear").compile().nv > 0
 
 
 @pytest.mark.parametrize(

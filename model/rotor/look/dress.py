@@ -53,9 +53,10 @@ def _add_balls(out: MjSpec, spindle: Spindle, bearing: BearingState) -> None:
     holder = out.body(f"{inner.name} carrier" if inner.turns else inner.name)
     springs, row = ball_springs(bearing), bearing.row
     centres = springs.inner + row.inner_length / row.unloaded_distance * (springs.outer - springs.inner)
-    rgba = [*(BALL if bearing.in_contact else LOOSE_BALL), 1.0]
+    pressed = np.linalg.norm(springs.outer - springs.inner, axis=1) > springs.rest if bearing.displacement else [bearing.in_contact] * len(centres)
     size = [spindle.bearing(bearing.name).ball_diameter / 2, 0, 0]
     for j, centre in enumerate(centres - [0.0, 0.0, inner.z]):
+        rgba = [*(BALL if pressed[j] else LOOSE_BALL), 1.0]
         shape = {"type": SPHERE, "size": size, "pos": centre, "material": "polished finish", "rgba": rgba}
         holder.add_geom(name=f"{bearing.name} ball {j}", **shape, **_visual(BALLS))
 
