@@ -87,16 +87,17 @@ def _all(spindle: Spindle, at: Sequence[OperatingPoint], probes: Sequence[Sequen
 
 def phasors(point: OperatingPoint, imperfections: Imperfections, probes: Sequence[Point]) -> dict[Key, ComplexArray]:
     """Phasors (probes,) m of every line that imperfections would excite at a point."""
-    _check_centred(point.spindle)
+    _check_centred(point)
     forces = at_speed(excitation(point, imperfections), 1.0)
     moved = chain_response(point.chain, forces)
     rows = np.array([np.array(p.direction) @ motion_rows(point.chain, p.body, p.position)[:3] for p in probes])
     return {key_of(line): rows @ one for line, one in zip(forces.line, moved, strict=True)}
 
 
-def _check_centred(spindle: Spindle) -> None:
+def _check_centred(point: OperatingPoint) -> None:
     """`BadInput` where radial loads or weight displace rings: sidebands, and what a perfect row does there, are no sources of their own."""
-    if spindle.loaded_across:
+    spindle = point.spindle
+    if any(any(b.displacement) for b in point.state.rolling):
         told = spindle.radial_loads[0].told if spindle.radial_loads else f"gravity_m_per_s2 = [{spindle.gravity[0]:g}, {spindle.gravity[1]:g}]"
         raise BadInput(f"{spindle.file or spindle.name}: {told}: runout tests are compared with centred rings alone, and this displaces them; take it out, or leave the runout tests out")
 

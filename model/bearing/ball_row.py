@@ -30,7 +30,7 @@ from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
 ROUNDS, STANDING = 20, 1e-12  # of the cage's speed, and what of it is no change
-TURNS = 8
+TURNS = 48
 """Places of the cage from one ball to the next at which a row is asked how far it departs from its mean."""
 ROUNDED = 4 * 2.0**-52
 """Of a distance of groove centres, what rounding may change of the two that a ball's centre divides it into."""
@@ -192,25 +192,17 @@ def _with_inertia(row: BallRow, line: Array, near: Rolled | None) -> tuple[tuple
     return values, cage, rolled
 
 
-def with_cage_held(row: BallRow) -> BallRow:
-    """The row whose cage keeps the speed that it has with centred rings, whatever balls and rings do."""
-    if row.inertia is None or not row.heavy:
-        return row
-    line = -row.radial, row.axial
-    return replace(row, inertia=replace(row.inertia, cage=at_one_speed(row, [line])[0]))
-
-
 def cage_spread(row: BallRow, displacement: Array) -> float:
-    """By how much of itself the radial stiffness of a row whose rings stand at a displacement (5,) departs, at most,
+    """By how much of itself the stiffness of a row whose rings stand at a displacement (5,) departs, at most, along x or y
     from its mean as its balls pass from each to the place of the next; 0 of one that carries nothing."""
     near, across = respond(row, displacement).rolled, []
     for turn in 2 * np.pi / row.balls * np.arange(TURNS) / TURNS:
         c, s = np.cos(turn), np.sin(turn)
         turned = np.eye(5)
         turned[:2, :2] = turned[3:, 3:] = [[c, s], [-s, c]]
-        across.append((turned.T @ respond(row, turned @ displacement, near).tangent @ turned)[:2, :2])
+        across.append(np.diag(turned.T @ respond(row, turned @ displacement, near).tangent @ turned)[:2])
     mean = np.mean(across, axis=0)
-    return float(np.abs(np.array(across) - mean).max() / np.abs(mean).max()) if mean.any() else 0.0
+    return float(max((np.abs(np.array(across)[:, i] / mean[i] - 1).max() for i in (0, 1) if mean[i] > 0), default=0.0))
 
 
 def by_own_orbits(row: BallRow, displacement: Array | None = None) -> Array:

@@ -31,7 +31,8 @@ same lines under the same names, Z those of one row and the contact angle 0, but
 Rings that a radial load or weight displaces press their balls by azimuth, so that each of these comes with sidebands, and in every
 direction: a race wave of order k Z + s at k Z (f_race - f_cage) + s f_race for any s (s = 1 and -1 across, 0 along the axis are those above),
 ball sizes at s f_cage, ball waves at 2 k f_ball + s f_cage. The balls that carry change as they pass, which moves the rings of a perfect
-row too, at k Z f_cage (*varying compliance*: Sunnersjo 1978, *J. Sound Vib.* 58, 363; Harris, ch. 25). No sense of whirl is then of one sign.
+row too, at k Z f_cage (*varying compliance*: Sunnersjo 1978, *J. Sound Vib.* 58, 363; Harris, ch. 25). What whirls one way between centred
+rings does so mostly still, and is called as there; the others go both ways.
 """
 
 from __future__ import annotations
@@ -108,7 +109,8 @@ class Line:
 VARYING = "varying compliance"
 CAUSES = ("unbalance", "inner waviness", "outer waviness", "ball waviness", "ball size", "cage unbalance", VARYING)
 SIDEBANDS = 2
-"""Of a row with displaced rings, up to which `lines` has them; weaker ones are in runout, as far as `sim.running.rows` says."""
+"""Of a row with displaced rings, up to which `lines` has them, of waves up to the highest multiple
+of balls and one more, as they are drawn; further ones are in runout, as far as `sim.running.pulls` says."""
 
 
 def kinematics(
@@ -156,7 +158,7 @@ def cage_line(bearing: str, kin: Kinematics, cause: str, times: int = 1, directi
 
 def varying_line(bearing: str, kin: Kinematics, passes: int, direction: str) -> Line:
     """The line of a perfect row whose balls pass where displaced rings press them; `passes` is a multiple of their number."""
-    return _line(bearing, VARYING, passes, f"{passes} fc", direction, 0, passes * kin.cage, kin)
+    return _line(bearing, VARYING, 0, f"{passes} fc", direction, 0, passes * kin.cage, kin)
 
 
 def race_line(bearing: str, kin: Kinematics, side: str, order: int, direction: str, passes: int | None = None) -> Line:
@@ -188,8 +190,11 @@ def ball_line(bearing: str, kin: Kinematics, order: int, direction: str, side: i
 
 
 def _sum(first: tuple[int, str], second: tuple[int, str], negative: bool) -> str:
-    """Two multiples in words, such as "12 (fi-fc) - 2 fi"; the other way round where they add up to less than nothing."""
-    terms = [(-n if negative else n, name) for n, name in (first, second) if n]
+    """Two multiples in words, such as "12 (fi-fc) - 2 fi"; the other way round where they add up to less than nothing,
+    unless both are of one sign, for the sense of a line is no part of its name."""
+    every = [n for n, _ in (first, second) if n]
+    turned = max(every) < 0 or (negative and min(every) < 0)
+    terms = [(-n if turned else n, name) for n, name in (first, second) if n]
     terms.sort(key=lambda term: term[0] < 0)
     words = [name if abs(n) == 1 else f"{abs(n)} {name}" for n, name in terms]
     return f" {'-' if terms[-1][0] < 0 else '+'} ".join(words)
@@ -233,10 +238,11 @@ def _centred(name: str, kin: Kinematics, highest: int) -> Iterator[Line]:
 
 def _sidebands(name: str, kin: Kinematics, highest: int) -> Iterator[Line]:
     passing = range(kin.balls, highest * kin.balls + 1, kin.balls)
-    sides = range(-SIDEBANDS, SIDEBANDS + 1)
+    most = min(SIDEBANDS, (kin.balls - 1) // 2)
+    sides = range(-most, most + 1)
     yield cage_line(name, kin, "cage unbalance")
     for direction in ("radial", "axial") if kin.angled else ("radial",):
-        yield from (cage_line(name, kin, "ball size", times, direction) for times in range(1, SIDEBANDS + 1))
+        yield from (cage_line(name, kin, "ball size", times, direction) for times in range(1, most + 1))
         yield from (varying_line(name, kin, passes, direction) for passes in passing)
         for ring in ("inner", "outer"):
             yield from (race_line(name, kin, ring, passes + by, direction, passes) for passes in (0, *passing) for by in sides if 0 < passes + by <= passing[-1] + 1)

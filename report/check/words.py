@@ -11,8 +11,8 @@ from thermospindle.model.errors import listed
 from thermospindle.report.text.grid import show_grid
 
 NOTABLE = 0.005
-PRODUCTS = "what the change itself mixes in is left out of them"
 """Of a stiffness, from which it is worth a sentence that the place of a cage changes it."""
+LEFT_OUT = "the motion that the changing stiffness itself makes is left out"
 
 
 def show_check(console: Console, values: Mapping[str, Any]) -> None:
@@ -150,7 +150,7 @@ def _passing(name: str, spread: float) -> str:
     """Of a ball row that a load has displaced so far that its stiffness goes with the place of its cage."""
     return (
         f"Bearing {name}: its stiffness across changes by up to {100 * spread:.2g}% as its balls pass the load; taken is that with a ball at azimuth 0. "
-        f"Lines of runout are those of this stiffness, and {PRODUCTS}."
+        f"Lines of runout are those of this stiffness, and {LEFT_OUT}."
     )
 
 

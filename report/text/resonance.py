@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.bearing.kinematics import Line
+from thermospindle.model.bearing.kinematics import VARYING, Line
 from thermospindle.model.errors import listed
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM, in_rpm
@@ -91,7 +91,7 @@ def _coincidence_json(c: Coincidence) -> dict[str, Any]:
         "sense": c.sense,
         "strength_um": 1e6 * c.strength,
         "strength_um_per_unit": 1e6 * c.unit_strength,
-        "unit": "g mm" if c.line.cause in ("unbalance", "cage unbalance") else "um",
+        "unit": None if c.line.cause == VARYING else "g mm" if c.line.cause in ("unbalance", "cage unbalance") else "um",
         "margin_percent": 100 * c.margin,
         "nrro_um": 1e6 * c.nrro,
         "at_nominal_speed": c.at_nominal_speed,

@@ -18,7 +18,7 @@ from rich.console import Console
 from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import TO_UM, in_rpm
-from thermospindle.report.check.words import NOTABLE, PRODUCTS
+from thermospindle.report.check.words import LEFT_OUT, NOTABLE
 from thermospindle.report.text.grid import OF_LINES, grid, show_grid
 from thermospindle.report.typeset import table, write_csv
 from thermospindle.sim.operating import provenance
@@ -68,7 +68,7 @@ def runout_json(runout: Runout, path: str, element: str, seed: int | None) -> di
         "temperature_C": condition.temperature,
         "speed_rpm": in_rpm(condition.speed),
         "status": runout.point.state.status,
-        "stiffness_changes": {b.name: cage_spread(b) for b in runout.point.state.rolling},
+        "cage_spread": {b.name: cage_spread(b) for b in runout.point.state.rolling},
         "seconds": runout.averaged.count / abs(runout.revolving),
         "revolutions": runout.averaged.count,
         "samples_per_revolution": len(time) // runout.averaged.count,
@@ -145,9 +145,9 @@ def show_runout(console: Console, answer: dict[str, Any], spindle: Spindle) -> N
     show_grid(console, f"Strongest lines of {len(answer['lines'])}", columns, rows, (*columns[4:], "direction"), keys=2)
     if spindle.rolling:
         console.print(f"{OF_LINES}.", highlight=False)
-    changing = [f"{name} {100 * share:.2g} %" for name, share in answer["stiffness_changes"].items() if share > NOTABLE]
+    changing = [f"{name} {100 * share:.2g} %" for name, share in answer["cage_spread"].items() if share > NOTABLE]
     if changing:
-        console.print(f"Stiffness across changes as balls pass the load: {', '.join(changing)}. Lines are those of a constant one, and {PRODUCTS}.", highlight=False)
+        console.print(f"Stiffness across changes as balls pass the load: {', '.join(changing)}. Lines are those of a constant one, and {LEFT_OUT}.", highlight=False)
 
 
 def _bearings(row: dict[str, Any]) -> str:

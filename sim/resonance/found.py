@@ -45,7 +45,7 @@ class Coincidence:
 
     `sense`: share of the modal force that its sense of whirl has (1: all, 1/2: a standing mode); `strength` (m, zero to peak)
     at the hub's probe under the map's imperfections, zero where they do not make this line; `unit_strength` (m) for 1 um of
-    wave or ball size or 1 g mm; `margin`: (line - mode) / mode at the nominal condition; `nrro` (m rms) of all nonrepeatable
+    wave or ball size or 1 g mm, of varying compliance as it is; `margin`: (line - mode) / mode at the nominal condition; `nrro` (m rms) of all nonrepeatable
     lines there, in the mode's direction; `at_nominal_speed`: found along temperature at the nominal speed, else along speed.
     """
 

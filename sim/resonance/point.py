@@ -105,8 +105,8 @@ def with_imperfections(point: OperatingPoint, imperfections: Imperfections) -> O
 
 
 def unit_imperfections(spindle: Spindle, multiples: int, displaced: bool) -> Imperfections:
-    """1 um of every wave that makes a line, on one ball 1 um of size and of every even wave, 1 g mm
-    of unbalance of hub and cages; with those of the sidebands of `displaced` rings."""
+    """1 um of every radial wave that makes a line, axial where its order is a multiple of the balls, on one ball 1 um of size and of
+    every even wave, 1 g mm of unbalance of hub and cages; with those of the sidebands of `displaced` rings."""
     sides = range(1, SIDEBANDS + 1) if displaced else (1,)
 
     def waves(orders: Sequence[int]) -> tuple[Wave, ...]:

@@ -12,8 +12,8 @@ order 1) moves its ring by exactly that, whatever stands in series with the row.
 the opposite (`sim.running.rows`, of line contacts too).
 
 Where a radial load or weight displaces rings, k and e are those of each azimuth (`sim.running.pulls`), displacements are from the mean
-loaded place, and what a perfect row does as its balls pass is excited with the rest. That stiffness changes meanwhile is left out: the
-product of two small things, as that of two imperfections is; `sim.running.moving_balls` has both.
+loaded place, and what a perfect row does as its balls pass is excited with the rest, with any imperfections or none. That stiffness changes meanwhile is left out,
+and with it what imperfections do that is as small (`pulls`); `sim.running.moving_balls` has all of it.
 
 Unbalance U at its height gives U omega^2, a couple unbalance W the moment W omega^2. An unbalanced cage is taken as guided by the outer
 ring: U omega_cage^2 acts on the outer body at the bearing.
@@ -105,7 +105,8 @@ def chain_response(chain: RotorBase, forces: Harmonics, known: Callable[[], Pole
 
 
 def excitation(point: OperatingPoint, imperfections: Imperfections | None = None) -> Excitation:
-    """All lines that a point's imperfections, or others in their place, excite, in order of frequency."""
+    """All lines that a point's imperfections, or others in their place, excite, and those of perfect rows
+    between displaced rings, in order of frequency."""
     present = point.imperfections if imperfections is None else imperfections
     n = len(point.chain.dofs)
     parts: dict[Line, ComplexArray] = {}

@@ -9,6 +9,10 @@ Of a ball, k the exact 2x2 stiffness of the line between its groove centres and 
 cage, whose speed changes with what each meets. Of a roller, s = c (10/9) d^(1/9) for every slice of it that is pressed by d.
 
 A perfect row pulls as well: -B^T f at each ball, whose sum over the balls changes with the place of the cage. Between centred rings it does not.
+
+Of an imperfection the harmonics below half the number of elements are taken. Through the higher ones it does what changes with the place of
+the cage, and so does the motion that it makes through the lower ones, times the stiffness that changes with that place: of the same size, and
+where a ring follows its race of opposite sign. Both are left out; neither is anything while all elements are pressed.
 """
 
 from __future__ import annotations
@@ -23,11 +27,10 @@ import numpy as np
 from thermospindle.model.bearing.ball_row import BallRow, Rolled, at_one_speed, azimuths, centre_line, kinematics, massless, respond
 from thermospindle.model.bearing.heavy_ball.balance import thicker
 from thermospindle.model.bearing.roller import EXPONENT, SLICES, WEIGHTS, RollerRow
-from thermospindle.model.bearing.roller import respond as rollers_respond
 from thermospindle.model.types import Array, ComplexArray
 
 HIGHEST = 3
-"""Harmonics are taken up to this multiple of the number of elements."""
+"""Harmonics of a perfect row are taken up to this multiple of the number of elements."""
 CENTRED, FEWEST, PLACES = 4, 16, 16
 """Azimuths at which a row is asked: between centred rings; between displaced ones at first, twice as many as long as
 harmonics beyond a quarter of them are something, and in the end so many for each element, as where some are loose."""
@@ -45,7 +48,8 @@ class Pulls:
 
     Of a ball the inputs are race displacements along r and z, the outer one's less the inner one's, and thickness at the inner and the outer contact; of
     a roller what presses it, one input for each row. `perfect[m]` (5,): the same of a row without imperfections (N, N m), empty between centred rings.
-    `compliance` (5, 5) of the whole row, nothing along what it does not resist; `lever` (m) makes a moment a force.
+    `compliance` (5, 5) of the whole row, the inverse of its mean tangent over all places of its cage, nothing along what it does not resist;
+    `lever` (m) makes a moment a force.
     """
 
     by: Mapping[int, ComplexArray]
@@ -63,25 +67,26 @@ def pulls_of(row: BallRow | RollerRow, displacement: tuple[float, ...] = ()) -> 
 def _of_balls(row: BallRow, displacement: tuple[float, ...]) -> Pulls:
     q = np.array(displacement or (0.0,) * 5)
     near = respond(row).rolled
-    whole = respond(row, q, near)
 
-    def at(places: int) -> tuple[Array, Array]:
+    def at(places: int) -> tuple[Array, Array, Array]:
         fine = replace(row, balls=places)
         force, local = _heavy(fine, q, near) if near is not None else _light(fine, q)
-        return -np.einsum("jpk,jp->jk", kinematics(fine), force)[:, :, None], -local
+        b = kinematics(fine)
+        return -np.einsum("jpk,jp->jk", b, force)[:, :, None], -local, np.einsum("jki,jil->kl", local[:, :, :2], b) * row.balls / places
 
-    return _pulls(at, row.balls, bool(displacement), whole.tangent, row.arm)
+    return _pulls(at, row.balls, bool(displacement), row.arm)
 
 
-def _pulls(at: Callable[[int], tuple[Array, Array]], elements: int, displaced: bool, tangent: Array, lever: float) -> Pulls:
-    """Those of what a row answers `at` so many azimuths: pull of an element that is perfect (places, 5, 1), and by its inputs (places, 5, inputs)."""
+def _pulls(at: Callable[[int], tuple[Array, Array, Array]], elements: int, displaced: bool, lever: float) -> Pulls:
+    """Those of what a row answers `at` so many azimuths: pull of an element that is perfect (places, 5, 1),
+    and by its inputs (places, 5, inputs); the row's mean tangent (5, 5)."""
     counts = [CENTRED] if not displaced else [*takewhile(lambda n: n < PLACES * elements, (FEWEST << k for k in count())), PLACES * elements]
     for places in counts:
-        perfect, by = at(places)
+        perfect, by, tangent = at(places)
         if _beyond(by, places // 4, lever) < SETTLED and _beyond(perfect, places // 4, lever) < SETTLED:
             break
-    most = min(HIGHEST * elements, places // 2 - 1) if displaced else 1
-    own = _harmonics(perfect, most, lever) if displaced else {}
+    own = _harmonics(perfect, min(HIGHEST * elements, places // 2 - 1), lever) if displaced else {}
+    most = min((elements - 1) // 2, places // 2 - 1) if displaced else 1
     return Pulls(_harmonics(by, most, lever), {m: g[:, 0] for m, g in own.items()}, _compliance(tangent, lever), lever)
 
 
@@ -129,17 +134,18 @@ def _of_rollers(row: RollerRow, displacement: tuple[float, ...]) -> Pulls:
     q = np.array(displacement or (0.0,) * 5)
     height = np.array(row.offsets)[:, None] + row.length / 2 * SLICES  # (rows, slices)
 
-    def at(places: int) -> tuple[Array, Array]:
+    def at(places: int) -> tuple[Array, Array, Array]:
         azimuth = azimuths(places)[:, None, None]
         c, s, o = np.cos(azimuth), np.sin(azimuth), np.zeros((places, *height.shape))
         outward = np.stack([o + c, o + s, o, -s * height, c * height], axis=-1)  # radial motion of the outer ring there, by its displacement
         pressed = np.maximum(-(outward @ q) - row.clearance / 2, 0.0)
         load = row.constant * WEIGHTS / 2 * pressed**EXPONENT
         slope = EXPONENT * load / np.where(pressed > 0, pressed, 1.0)
-        return np.einsum("jrs,jrsk->jk", load, outward)[:, :, None], np.einsum("jrs,jrsk->jkr", slope, outward)
+        tangent = np.einsum("jrs,jrsk,jrsl->kl", slope, outward, outward) * row.rollers / places
+        return np.einsum("jrs,jrsk->jk", load, outward)[:, :, None], np.einsum("jrs,jrsk->jkr", slope, outward), tangent
 
     lever = row.length / 2 + max(np.abs(row.offsets))
-    return _pulls(at, row.rollers, bool(displacement), rollers_respond(row, q).tangent, lever)
+    return _pulls(at, row.rollers, bool(displacement), lever)
 
 
 def _harmonics(pull: Array, most: int, lever: float) -> dict[int, ComplexArray]:

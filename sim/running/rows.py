@@ -4,7 +4,7 @@ An imperfection is met by every element as Re(amplitude exp(i rate t)), the rate
 over the elements is, of harmonic m, pull_m times the sum of amplitude_j exp(2 pi i j m / Z), at rate + m cage: orders that cancel are found to
 cancel, not said to. A free displacement is that sum times the row's compliance: displaced by it, the rings feel what they felt before.
 
-Of rows with displaced rings lines weaker than `WEAK` of the row's strongest force are left out: there are thousands.
+Of rows with displaced rings lines weaker than `WEAK` of the strongest that their imperfections make are left out: there are thousands.
 Loose elements carry nothing and excite nothing. Waves of a roller bearing's race run straight along it and meet all rows alike,
 sizes and waves of rollers stand row by row; the rows' rollers stand at the same azimuths.
 """
@@ -91,11 +91,13 @@ def _found(name: str, row: BallRow | RollerRow, displacement: tuple[float, ...],
         for n, k in np.argwhere(some).tolist():
             met, m = every[n], harmonics[k]
             add(made[n, k], met.rate(kin) + m * kin.cage, partial(met.line, name, kin, m))
+    if displacement:
+        size = {line: np.abs(unit * force).max() for line, force in forces.items()}
+        forces = {line: force for line, force in forces.items() if size[line] >= WEAK * max(size.values())}
     for m, pull in pulls.perfect.items():
         if m % kin.balls == 0:
             add(kin.balls * pull, m * kin.cage, partial(varying_line, name, kin, abs(m)))
-    least = WEAK * max((np.abs(unit * force).max() for force in forces.values()), default=0.0) if displacement else 0.0
-    found = {line: pulls.compliance @ force for line, force in forces.items() if np.abs(unit * force).max() >= least}
+    found = {line: pulls.compliance @ force for line, force in forces.items()}
     for moved in found.values():
         moved.flags.writeable = False
     return found

@@ -206,7 +206,8 @@ def _known(point: OperatingPoint) -> tuple[tuple[Line, ...], ComplexArray]:
     """All lines of theory, those that the point's imperfections excite first, and their phasors (lines, dofs) m: 0 for the others."""
     excited = harmonics(point)
     theory = lines(point.spindle, row_kinematics(point.spindle, point.state), point.condition.speed)
-    others = [line for line in theory if line not in set(excited.line)]
+    own = set(excited.line)
+    others = [line for line in theory if line not in own]
     nothing = np.zeros((len(others), len(point.chain.dofs)))
     return (*excited.line, *others), np.vstack([response(point, excited), nothing])
 

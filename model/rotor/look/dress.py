@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.model.bearing.ball_row import respond
 from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.bearing.springs import ball_springs
 from thermospindle.model.machine import Spindle
@@ -53,7 +54,8 @@ def _add_balls(out: MjSpec, spindle: Spindle, bearing: BearingState) -> None:
     holder = out.body(f"{inner.name} carrier" if inner.turns else inner.name)
     springs, row = ball_springs(bearing), bearing.row
     centres = springs.inner + row.inner_length / row.unloaded_distance * (springs.outer - springs.inner)
-    pressed = np.linalg.norm(springs.outer - springs.inner, axis=1) > springs.rest if bearing.displacement else [bearing.in_contact] * len(centres)
+    moved = np.array(bearing.displacement)
+    pressed = respond(row, moved, respond(row).rolled).in_contact if moved.any() else [bearing.in_contact] * len(centres)
     size = [spindle.bearing(bearing.name).ball_diameter / 2, 0, 0]
     for j, centre in enumerate(centres - [0.0, 0.0, inner.z]):
         rgba = [*(BALL if pressed[j] else LOOSE_BALL), 1.0]

@@ -2,6 +2,7 @@
 amplitudes, forces of the whole row at every place of its cage, and rings moved as a whole."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from thermospindle.cli import main
 from thermospindle.diagnosis.runout.sources import phasors
 from thermospindle.model.bearing import ball_row, roller
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow
-from thermospindle.model.bearing.kinematics import VARYING, lines, row_kinematics
+from thermospindle.model.bearing.kinematics import VARYING, Kinematics, ball_line, lines, race_line, row_kinematics
 from thermospindle.model.bearing.roller import RollerRow, line_constant
 from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
@@ -56,16 +57,44 @@ def hub(point: OperatingPoint, moved: Array) -> Array:
 
 @pytest.mark.parametrize(("newton", "within"), [(10.0, 3e-3), (30.0, 0.01)])
 def test_moving_balls_do_what_the_lines_say(spindle, newton, within):
-    """A tenth of drawn imperfections under 10 N, which presses balls with 2.5 to 5.4 N, and 30 N, which nearly lets one go."""
+    """A tenth of drawn imperfections: under 10 N, which presses balls with 2.5 to 5.4 N, and 30 N, which nearly lets one go."""
     point, own = pushed(spindle, newton), drawn(spindle, 1)
-    time, [moved] = run_moving_balls(point, own, 0.03, (0.1,))
+    time, moved = run_moving_balls(point, own, 0.03, (0.0, 0.1))
     late = time > 0.02
     perfect, made = (linear_motion(point, which, time[late]) for which in (Imperfections(), own))
-    linear = hub(point, perfect + 0.1 * (made - perfect))
-    assert hub(point, moved[late]) == pytest.approx(linear, abs=within * np.abs(linear).max())
+    linear = hub(point, 0.1 * (made - perfect))
+    real = hub(point, (moved[1] - moved[0])[late])
+    assert real == pytest.approx(linear, abs=within * np.abs(linear).max())
     centred = replace(point, state=replace(point.state, bearings=tuple(replace(b, displacement=()) for b in point.state.bearings)))
     without = hub(point, 0.1 * linear_motion(centred, own, time[late]))
-    assert np.abs(without - linear).max() > 5 * within * np.abs(linear).max()  # and not what they say of centred rings
+    assert np.abs(without - linear).max() > 3 * within * np.abs(linear).max()  # and not what they say of centred rings
+
+
+def test_where_balls_are_let_go_lines_are_off_by_what_the_changing_stiffness_does(spindle):
+    """Under 60 N, where that of the lower row changes by 7 %: across by 9 % rms, along the axis, whose mode it drives, by a
+    quarter, whatever the size of the imperfections."""
+    point, own = pushed(spindle, 60.0), drawn(spindle, 1)
+    assert 0.06 < cage_spread(point.state.bearing("lower")) < 0.075
+    time, moved = run_moving_balls(point, own, 0.05, (0.0, 0.01, 0.1))
+    late = time > 0.02
+    perfect, made = (linear_motion(point, which, time[late]) for which in (Imperfections(), own))
+    linear = hub(point, made - perfect)
+    for k, factor in ((1, 0.01), (2, 0.1)):
+        off = hub(point, (moved[k] - moved[0])[late]) / factor - linear
+        assert (np.sqrt(np.mean(off**2, axis=0) / np.mean(linear**2, axis=0)) < [0.11, 0.11, 0.3]).all()
+
+
+def test_a_ring_follows_an_eccentric_race_whatever_its_balls_do(spindle):
+    """Of 100 nm under 60 N, where stiffness changes by a twentieth: the hub goes round with it, and what else it
+    does is a hundredth of that, as the moving balls say."""
+    point = pushed(spindle, 60.0)
+    own = Imperfections(bearings={"lower": RowImperfections(outer_radial=(Wave(1, 1e-7, 0.3),))})
+    time, moved = run_moving_balls(point, own, 0.04, (0.0, 0.2))
+    late = time > 0.02
+    perfect, made = (linear_motion(point, which, time[late]) for which in (Imperfections(), own))
+    linear, real = hub(point, made - perfect), hub(point, (moved[1] - moved[0])[late]) / 0.2
+    assert real == pytest.approx(linear, abs=0.03 * np.abs(linear).max())
+    assert {x.name for x in excitation(point, own).line if x.cause == "outer waviness"} == {"fo"}
 
 
 def test_a_perfect_row_moves_as_its_balls_pass(spindle):
@@ -127,22 +156,36 @@ def test_elements_all_too_thick_do_what_the_row_says(row, contact):
     assert np.abs(found.imag).max() < 1e-9 * np.abs(found).max()
 
 
+@pytest.mark.parametrize("far", [1.0, 6.0], ids=["all pressed", "some loose"])
 @ROWS
-def test_a_race_that_is_displaced_as_a_whole_takes_its_ring_along(row):
-    """Order 1 of a race, radial and axial, felt with every harmonic at once: the row's stiffness times that displacement."""
-    q, elements = tuple(ASIDE), row.rollers if isinstance(row, RollerRow) else row.balls
-    pulls = pulls_of(row, q)
-    tangent = roller.respond(row, ASIDE).tangent if isinstance(row, RollerRow) else ball_row.respond(row, ASIDE).tangent
-    along_x = sum(elements / 2 * pulls.by[m] for m in (-1, 1))  # of what is cos(azimuth)
+def test_a_race_that_is_displaced_as_a_whole_takes_its_ring_along(spindle, row, far):
+    """Order 1 of the outer race, radial and axial: displaced by as much, and tilted by amplitude over lever, wherever the balls stand."""
     if isinstance(row, RollerRow):
-        assert along_x.sum(axis=1).real == pytest.approx(tangent[:, 0], rel=1e-3, abs=1e-4 * tangent[0, 0])
+        tail = load("tailstock")
+        state, elements = replace(roller.roller_state(tail, tail.roller_bearings[0], None, 20.0), row=row, displacement=tuple(far * ASIDE), load=1.0), row.rollers
     else:
-        assert -along_x[:, 0].real == pytest.approx(tangent[:, 0], rel=1e-6, abs=1e-7 * tangent[0, 0])
-        assert -along_x[:, 1].real * -row.arm == pytest.approx(tangent[:, 4], rel=1e-6, abs=1e-7 * np.abs(tangent[:, 4]).max())
-        assert -elements * pulls.by[0][:, 1].real == pytest.approx(tangent[:, 2], rel=1e-6, abs=1e-7 * tangent[2, 2])
+        state, elements = replace(operating_point(spindle, Condition(20.0)).state.bearing("upper"), row=row, displacement=tuple(far * ASIDE)), row.balls
+    kin = Kinematics(0.0, SPIN, 0.45 * SPIN, 3 * SPIN, elements, not isinstance(row, RollerRow), displaced=True)
+    found = free_displacements(state, kin, RowImperfections(outer_radial=(Wave(1, 2e-8, 0.0),)))
+    assert {line.name for line, _ in found if line.cause != VARYING} == {"fo"}
+    assert sum(moved for line, moved in found if line.name == "fo") == pytest.approx(-2e-8 * np.array([1, -1j, 0, 0, 0]), rel=1e-6, abs=1e-12)
+    if not isinstance(row, RollerRow):
+        found = free_displacements(state, kin, RowImperfections(outer_axial=(Wave(1, 2e-8, 0.0),)))
+        assert sum(moved for line, moved in found if line.name == "fo") == pytest.approx(-2e-8 / row.arm * np.array([0, 0, 0, -1j, -1]), rel=1e-6, abs=1e-12)
 
 
 # ---------------------------------------------------------------- lines
+
+
+def test_names_are_sums_of_what_they_name():
+    """Rings that turn the same way, the cage between them and faster than one: 10 (60 - 76.1) + 60 is 101 Hz, whichever way round it is written."""
+    kin = Kinematics(2 * np.pi * 100, 2 * np.pi * 60, 2 * np.pi * 76.1, 2 * np.pi * 300, 10, displaced=True)
+    told = {"fi": 100.0, "fo": 60.0, "fc": 76.1, "fb": 300.0}
+    every = [race_line("b", kin, side, passes + by, "radial", passes) for side in ("inner", "outer") for passes in (0, 10, 20) for by in (-2, -1, 0, 1, 2) if passes + by > 0]
+    every += [ball_line("b", kin, order, "radial", by) for order in (2, 4) for by in (-2, -1, 0, 1, 2)]
+    for line in every:
+        sums = re.sub(r"(\d) (\(|f)", r"\1 * \2", line.name)
+        assert abs(eval(sums, {}, told)) == pytest.approx(line.frequency, rel=1e-9), line.name
 
 
 def test_sidebands_stand_where_the_frames_say(spindle):
@@ -210,12 +253,25 @@ def test_balls_that_do_not_orbit_give_the_same_lines(lying, spindle, load_along)
         assert line.amplitude == pytest.approx(line.predicted, rel=0.01)
 
 
-def test_runout_tells_where_stiffness_changes(lying, capsys):
-    assert main(["runout", str(lying), "--path", "linear", "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert 0 < answer["stiffness_changes"]["upper"] < 1e-3
+def test_runout_tells_where_stiffness_changes(lying, tmp_path, capsys):
+    """Of the row as it stands, ball by ball at places of its cage."""
+    text = (lying / "spindle.toml").read_text(encoding="utf-8")
+    (tmp_path / "spindle.toml").write_text(text.replace("[8.0, -2.0]", "[60.0, -15.0]"), encoding="utf-8")
+    assert main(["runout", str(tmp_path), "--path", "linear", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["cage_spread"]
+    b = operating_point(load(tmp_path), Condition(20.0, SPIN)).state.bearing("lower")
+    h, q = 1e-10, np.array(b.displacement)
+    slopes = []
+    for turn in 2 * np.pi / 10 * np.arange(48) / 48:
+        ends = [[whole(b.row, q + s * h * np.eye(5)[i], turn)[i] for i in (0, 1)] for s in (1, -1)]
+        slopes.append((np.array(ends[0]) - np.array(ends[1])) / (2 * h))
+    mean = np.mean(slopes, axis=0)
+    assert told["lower"] == pytest.approx(np.abs(np.array(slopes) / mean - 1).max(), rel=0.02)
+    assert told["lower"] > 0.02 > told["upper"]
     assert main(["runout", "hdd_2003", "--path", "linear", "--json"]) == 0
-    assert set(json.loads(capsys.readouterr().out)["stiffness_changes"].values()) == {0.0}
+    assert set(json.loads(capsys.readouterr().out)["cage_spread"].values()) == {0.0}
+    assert main(["runout", str(tmp_path), "--path", "linear"]) == 0
+    assert "Stiffness across changes as balls pass the load: lower" in " ".join(capsys.readouterr().out.split())
 
 
 def test_a_map_has_the_sidebands(lying):
@@ -224,7 +280,8 @@ def test_a_map_has_the_sidebands(lying):
     names = {c.line.name for c in found.coincidences}
     assert any("2 fo" in name or "2 fc" in name for name in names)
     assert all(np.isfinite(c.strength) and np.isfinite(c.nrro) for c in found.coincidences)
-    assert len({(c.line.bearing, c.line.cause, c.line.name, c.line.direction, c.line.order, c.mode.number, c.condition) for c in found.coincidences}) == len(found.coincidences)
+    places = [(c.line.bearing, c.line.cause, c.line.name, c.line.direction, c.line.order, c.mode.number, c.at_nominal_speed, round(c.condition.speed, 1)) for c in found.coincidences]
+    assert len(set(places)) == len(places)
 
 
 def test_a_margin_counts_sidebands(lying):
