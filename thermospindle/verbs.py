@@ -37,7 +37,7 @@ PATHS = ("simulated", "linear")
 
 def table(spindle: Spindle | str | Path, temperatures_C: Sequence[float] | None = None, *, speeds_rpm: Sequence[float] = (0.0,)) -> StiffnessTable:
     """Bearing stiffness over temperature, by default over the scene's range, and speed:
-    `.values["front1"]["radial_stiffness_N_per_m"]` is (temperatures, speeds)."""
+    `.values["front1"]["radial_stiffness_N_per_m"]` is (temperatures, speeds), each once and rising (`.temperature` C, `.speed` rad/s)."""
     drawing = drawing_of(spindle)
     return stiffness_table(drawing, _temperatures(drawing, temperatures_C, STEPS), _speeds("speeds_rpm", speeds_rpm))
 

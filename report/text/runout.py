@@ -145,9 +145,14 @@ def show_runout(console: Console, answer: dict[str, Any], spindle: Spindle) -> N
     show_grid(console, f"Strongest lines of {len(answer['lines'])}", columns, rows, (*columns[4:], "direction"), keys=2)
     if spindle.rolling:
         console.print(f"{OF_LINES}.", highlight=False)
-    changing = [f"{name} {100 * share:.2g} %" for name, share in answer["cage_spread"].items() if share > NOTABLE]
-    if changing:
-        console.print(f"Stiffness across changes as balls pass the load: {', '.join(changing)}. Lines are those of a constant one, and {LEFT_OUT}.", highlight=False)
+    if changing := _changing(answer):
+        console.print(changing, highlight=False)
+
+
+def _changing(answer: dict[str, Any]) -> str:
+    """Of which bearings stiffness changes as balls pass a load, in a sentence; empty where next to nothing does."""
+    own = [f"{name} {100 * share:.2g} %" for name, share in answer["cage_spread"].items() if share > NOTABLE]
+    return f"Stiffness across changes as balls pass the load: {', '.join(own)}. Lines are those of a constant one, and {LEFT_OUT}." if own else ""
 
 
 def _bearings(row: dict[str, Any]) -> str:
@@ -237,5 +242,6 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
         f"{table(('nm', f'radial ({escape(where)} x)', f'radial ({escape(where)} y)', 'axial'), quoted)}"
         f"{''.join(drawn.values())}"
         f"{table(('Hz', 'orders', 'direction', 'nm', 'line', 'cause'), lines, (2, 4, 5))}"
+        + (f"<p>{escape(changing)}</p>" if (changing := _changing(answer)) else "")
     )
     return "Runout", text
