@@ -30,6 +30,8 @@ from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
 ROUNDS, STANDING = 20, 1e-12  # of the cage's speed, and what of it is no change
+CHANGES, EVERY = 1e-7, 16
+"""Of the force of a row, what is a change as its balls pass; then places of its cage from one ball to the next whose mean is taken."""
 TURNS = 48
 """Places of the cage from one ball to the next at which a row is asked how far it departs from its mean."""
 ROUNDED = 4 * 2.0**-52
@@ -190,6 +192,15 @@ def _with_inertia(row: BallRow, line: Array, near: Rolled | None) -> tuple[tuple
     by_itself = 1.0 - float(np.mean([d.by_cage for d in each]))
     cage = Cage(np.array([d.force_by_cage for d in each]), np.array([d.by_line for d in each]) / len(each) / by_itself)
     return values, cage, rolled
+
+
+def at_all_places(row: BallRow, displacement: Array) -> tuple[BallRow, int]:
+    """A row with its balls at so many places of the cage at once, whose forces are so many times the mean of them; the row itself, and
+    1, where no place differs from another, as between rings that press all balls: asked of balls without inertia."""
+    light, scale = replace(row, inertia=None), np.array([1, 1, 1, 1 / row.arm, 1 / row.arm])
+    alone, between = (respond(replace(light, balls=n * row.balls), displacement).force / n for n in (1, 2))
+    changes = np.abs(scale * (between - alone)).max() > CHANGES * np.abs(scale * alone).max()
+    return (replace(row, balls=EVERY * row.balls), EVERY) if changes else (row, 1)
 
 
 def cage_spread(row: BallRow, displacement: Array) -> float:

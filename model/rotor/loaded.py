@@ -51,8 +51,8 @@ def loaded(spindle: Spindle, state: PairState) -> PairState:
     """The state with its rows where the scene's radial loads, and the weight of a spindle that
     lies, displace them; the state itself where there are none.
 
-    Stiffness is the tangent there, forces those of the most loaded ball or roller; bearings given by numbers bear their share and stay as
-    stiff. Rings on a spring slide, without friction, as far as their rows push them. Raises `NoEquilibrium` where nothing bears the load.
+    Stiffness is the tangent there, the mean over all places of the cage, forces those of the most loaded ball or roller; bearings given by
+    numbers bear their share and stay as stiff. Rings on a spring slide, without friction, as far as their rows push them. Raises `NoEquilibrium` where nothing bears the load.
     """
     if not spindle.loaded_across:
         return state
@@ -66,13 +66,18 @@ def motion(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array]:
     """The chain at a centred state, and the motion (n,) of its degrees of freedom under the scene's
     radial loads and weight; raises as `loaded`."""
     chain = rotor_base(_rings_apart(spindle), state)
-    rows = [_ball(chain, b) for b in state.bearings] + [_roller(chain, b) for b in state.linear if isinstance(b, RollerState)]
+    rows = [_ball(chain, b, (b.row, 1)) for b in state.bearings] + [_roller(chain, b) for b in state.linear if isinstance(b, RollerState)]
     own = {row.name for row in rows}
     linear = matrices(replace(chain, elements=tuple(e for e in chain.elements if e.name not in own)))
     forces = [(load_carrier(spindle, load).name, load.z, np.array(load.force)) for load in spindle.radial_loads]
     forces += [(b.name, b.z, b.mass * np.array(spindle.gravity)) for b in chain.bodies if any(spindle.gravity)]
     load = sum((motion_rows(chain, body, (0.0, 0.0, z))[:2].T @ force for body, z, force in forces), start=np.zeros(len(linear.mass)))
-    return chain, _motion(linear.stiffness, np.diag(linear.mass), rows, load, sum(float(np.hypot(*force)) for _, _, force in forces))
+    size, mass = sum(float(np.hypot(*force)) for _, _, force in forces), np.diag(linear.mass)
+    moved = _motion(linear.stiffness, mass, rows, load, size)
+    balls = {b.name: ball_row.at_all_places(b.row, _rows(chain, b.name) @ moved) for b in state.bearings}
+    if all(places == 1 for _, places in balls.values()):
+        return chain, moved
+    return chain, _motion(linear.stiffness, mass, [*(_ball(chain, b, balls[b.name]) for b in state.bearings), *rows[len(state.bearings) :]], load, size)
 
 
 def _rings_apart(spindle: Spindle) -> Spindle:
@@ -86,8 +91,10 @@ def _rings_apart(spindle: Spindle) -> Spindle:
     return replace(spindle, sets=tuple(free(s) for s in spindle.sets))
 
 
-def _ball(chain: RotorBase, b: BearingState) -> _Row:
-    light = replace(b.row, inertia=None)
+def _ball(chain: RotorBase, b: BearingState, every: tuple[BallRow, int]) -> _Row:
+    """Of a row with its balls at so many places of the cage (`ball_row.at_all_places`)."""
+    row, places = every
+    light = replace(row, inertia=None)
 
     def of(row: BallRow) -> Callable[[Array], tuple[Array, Array]]:
         last: ball_row.Rolled | None = None
@@ -96,11 +103,11 @@ def _ball(chain: RotorBase, b: BearingState) -> _Row:
             nonlocal last
             found = ball_row.respond(row, q, last)
             last = found.rolled
-            return found.force, found.tangent
+            return found.force / places, found.tangent / places
 
         return answer
 
-    return _Row(b.name, _rows(chain, b.name), of(b.row), of(light), lambda q: ball_row.energy(light, q))
+    return _Row(b.name, _rows(chain, b.name), of(row), of(light), lambda q: ball_row.energy(light, q) / places)
 
 
 def _roller(chain: RotorBase, b: RollerState) -> _Row:
@@ -193,8 +200,9 @@ def _even(tangent: Array) -> Array:
 
 
 def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
-    answer = ball_row.respond(b.row, q, ball_row.respond(b.row).rolled)
-    stiffness = _even(answer.tangent)
+    row, places = ball_row.at_all_places(b.row, q)
+    answer = ball_row.respond(row, q, ball_row.respond(row).rolled)
+    stiffness, force = _even(answer.tangent) / places, answer.force / places
     share = answer.ball_force / max(float(answer.ball_force.sum()), 1e-300)
     most = int(np.argmax(answer.ball_force))
     return replace(
@@ -205,12 +213,12 @@ def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
         contact_force=float(answer.ball_force[most]),
         outer_contact_force=float(answer.outer_ball_force[most]),
         ball_stiffness=1.5 * b.row.constant * max(float(answer.deformation[most]), 0.0) ** 0.5,
-        preload=spindle.bearing(b.name).sense * float(answer.force[2]),
+        preload=spindle.bearing(b.name).sense * float(force[2]),
         stiffness=stiffness,
         damping=spindle.structure.damping_time(spindle.bearing(b.name).damping_ratio) * stiffness,
         in_contact=bool(answer.in_contact.any()),
         displacement=tuple(float(x) for x in q),
-        radial_force=(float(answer.force[0]), float(answer.force[1])),
+        radial_force=(float(force[0]), float(force[1])),
     )
 
 

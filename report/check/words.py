@@ -149,7 +149,7 @@ def _rollers(name: str, b: Mapping[str, Any]) -> str:
 def _passing(name: str, spread: float) -> str:
     """Of a ball row that a load has displaced so far that its stiffness goes with the place of its cage."""
     return (
-        f"Bearing {name}: its stiffness across changes by up to {100 * spread:.2g}% as its balls pass the load; taken is that with a ball at azimuth 0. "
+        f"Bearing {name}: its stiffness across changes by up to {100 * spread:.2g}% as its balls pass the load; taken is the mean over all places of its cage. "
         f"Lines of runout are those of this stiffness, and {LEFT_OUT}."
     )
 

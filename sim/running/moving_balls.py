@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from thermospindle.model.bearing.ball_row import BallRow, respond
+from thermospindle.model.bearing.ball_row import BallRow, at_all_places, respond
 from thermospindle.model.bearing.kinematics import Kinematics, row_kinematics
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
@@ -106,7 +106,7 @@ def run_moving_balls(
     rows, stiffness = [element_rows(chain, e) for e in elements], [e.stiffness for e in elements]
     kin = row_kinematics(point.spindle, point.state)
     contacts = [ball_contacts(b, kin[b.name], own.row(b.name), time) for b in point.state.bearings]
-    held = [respond(b.row, np.array(b.displacement or (0.0,) * 5)).force for b in point.state.bearings]
+    held = [_mean_force(b) for b in point.state.bearings]
     given = scale[:, :, None] * _unbalance_forces(point, own, kin, time)
     for b, bearing in enumerate(point.state.bearings):  # damping of the loads that imperfections alone would make
         halves = ball_contacts(bearing, kin[bearing.name], own.row(bearing.name), np.append(time - step / 2, time[-1] + step / 2))
@@ -139,6 +139,13 @@ def run_moving_balls(
         before, force = force, remainder(k, state[:, :n])
         displacement[:, k] = state[:, :n]
     return time, displacement
+
+
+def _mean_force(bearing: BearingState) -> Array:
+    """Force (5,) that holds the outer ring, the mean over all places of the cage."""
+    displacement = np.array(bearing.displacement or (0.0,) * 5)
+    row, places = at_all_places(bearing.row, displacement)
+    return respond(row, displacement).force / places
 
 
 def difference_from_linear(

@@ -29,7 +29,7 @@ from thermospindle.model.bearing.heavy_ball.balance import thicker
 from thermospindle.model.bearing.roller import EXPONENT, SLICES, WEIGHTS, RollerRow
 from thermospindle.model.types import Array, ComplexArray
 
-HIGHEST = 3
+HIGHEST = 6
 """Harmonics of a perfect row are taken up to this multiple of the number of elements."""
 CENTRED, FEWEST, PLACES = 4, 16, 16
 """Azimuths at which a row is asked: between centred rings; between displaced ones at first, twice as many as long as

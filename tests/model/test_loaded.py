@@ -150,6 +150,26 @@ def test_a_large_load_unloads_balls_opposite_and_presses_others(pair: Spindle) -
     assert along != pytest.approx(across, rel=0.02)
 
 
+def test_where_balls_are_let_go_the_mean_over_the_places_of_the_cage_balances(pair: Spindle) -> None:
+    """Of the forces of rows turned ball by ball, place by place; and so is the stiffness: no place of the cage is the row's own."""
+    _, state = under(pair, (60.0, 10.0), 0.02)
+    loose = 0
+    for b in state.bearings:
+        q, found, tangents = np.array(b.displacement), [], []
+        for turn in 2 * np.pi / b.row.balls * np.arange(16) / 16:
+            c, s = np.cos(turn), np.sin(turn)
+            turned = np.eye(5)
+            turned[:2, :2] = turned[3:, 3:] = [[c, s], [-s, c]]
+            answer = respond(b.row, turned @ q)
+            loose += not answer.in_contact.all()
+            found.append(turned.T @ answer.force)
+            tangents.append(turned.T @ answer.tangent @ turned)
+        assert b.radial_force == pytest.approx(np.mean(found, axis=0)[:2], rel=1e-9)
+        assert b.stiffness == pytest.approx(np.mean(tangents, axis=0), rel=1e-9, abs=1e-9 * b.stiffness[0, 0])
+    assert loose
+    assert shares(state).sum(axis=0) == pytest.approx([60.0, 10.0], rel=1e-6)
+
+
 @pytest.mark.parametrize("speed", [0.0, 800.0])
 def test_stiffness_is_the_derivative_of_the_motion(five: Spindle, speed: float) -> None:
     """A little more load moves the nose by the static compliance of the chain in the loaded state, with balls' inertia too."""

@@ -72,7 +72,7 @@ def test_moving_balls_do_what_the_lines_say(spindle, newton, within):
 
 def test_where_balls_are_let_go_lines_are_off_by_what_the_changing_stiffness_does(spindle):
     """Under 60 N, where that of the lower row changes by 7 %: across by 9 % rms, along the axis, whose mode it drives, by a
-    quarter, whatever the size of the imperfections."""
+    fifth, whatever the size of the imperfections."""
     point, own = pushed(spindle, 60.0), drawn(spindle, 1)
     assert 0.06 < cage_spread(point.state.bearing("lower")) < 0.075
     time, moved = run_moving_balls(point, own, 0.05, (0.0, 0.01, 0.1))
@@ -81,7 +81,7 @@ def test_where_balls_are_let_go_lines_are_off_by_what_the_changing_stiffness_doe
     linear = hub(point, made - perfect)
     for k, factor in ((1, 0.01), (2, 0.1)):
         off = hub(point, (moved[k] - moved[0])[late]) / factor - linear
-        assert (np.sqrt(np.mean(off**2, axis=0) / np.mean(linear**2, axis=0)) < [0.11, 0.11, 0.3]).all()
+        assert (np.sqrt(np.mean(off**2, axis=0) / np.mean(linear**2, axis=0)) < [0.11, 0.11, 0.25]).all()
 
 
 def test_a_ring_follows_an_eccentric_race_whatever_its_balls_do(spindle):
@@ -98,17 +98,17 @@ def test_a_ring_follows_an_eccentric_race_whatever_its_balls_do(spindle):
 
 
 def test_a_perfect_row_moves_as_its_balls_pass(spindle):
-    """Under 70 N four of ten balls carry nothing: ten times the cage and its multiples alone, as far as a constant stiffness knows, 84 % of it."""
+    """Under 70 N four of ten balls carry nothing: ten times the cage and its multiples, which a constant stiffness has within a tenth."""
     point = pushed(spindle, 70.0)
     time, [moved] = run_moving_balls(point, Imperfections(), 0.04, (1.0,))
     late = time > 0.02
     linear, real = hub(point, linear_motion(point, Imperfections(), time[late])), hub(point, moved[late])
-    assert np.sqrt(np.mean((real - linear) ** 2) / np.mean(real**2)) < 0.25
+    assert np.sqrt(np.mean((real - linear) ** 2) / np.mean(real**2)) < 0.1
     cage = row_kinematics(point.spindle, point.state)["lower"].cage / (2 * np.pi)
     own = [x for x in excitation(point).line if x.bearing == "lower"]
     assert {(x.cause, x.whirl) for x in own} == {(VARYING, 0)}
-    assert sorted({round(x.frequency / cage, 9) for x in own}) == [10.0, 20.0, 30.0]
-    assert {x.name for x in own} == {"10 fc", "20 fc", "30 fc"}
+    assert sorted({round(x.frequency / cage, 9) for x in own}) == [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]
+    assert {x.name for x in own} == {f"{10 * k} fc" for k in range(1, 7)}
     assert cage_spread(point.state.bearing("lower")) > 0.05
 
 
