@@ -51,7 +51,7 @@ class Exact:
     def unit_forces(self, bearing: str) -> Harmonics:
         """Of unit imperfections of one bearing, or of the rotor for the line of no bearing."""
         if bearing not in self._unit_forces:
-            whole = unit_imperfections(self.point.spindle, self.multiples, self.point.spindle.loaded_across)
+            whole = unit_imperfections(self.point.spindle, self.multiples)
             own = replace(whole, bearings={name: row for name, row in whole.bearings.items() if name == bearing})
             self._unit_forces[bearing] = harmonics(with_imperfections(self.point, own))
         return self._unit_forces[bearing]
@@ -104,10 +104,10 @@ def with_imperfections(point: OperatingPoint, imperfections: Imperfections) -> O
     return replace(point, spindle=replace(point.spindle, imperfections=imperfections), effects=effects)
 
 
-def unit_imperfections(spindle: Spindle, multiples: int, displaced: bool) -> Imperfections:
+def unit_imperfections(spindle: Spindle, multiples: int) -> Imperfections:
     """1 um of every radial wave that makes a line, axial where its order is a multiple of the balls, on one ball 1 um of size and of
-    every even wave, 1 g mm of unbalance of hub and cages; with those of the sidebands of `displaced` rings."""
-    sides = range(1, SIDEBANDS + 1) if displaced else (1,)
+    every even wave, 1 g mm of unbalance of hub and cages; with those of the sidebands of rings that a load displaces."""
+    sides = range(1, SIDEBANDS + 1) if spindle.loaded_across else (1,)
 
     def waves(orders: Sequence[int]) -> tuple[Wave, ...]:
         return tuple(Wave(n, UNIT_WAVE, 0.0) for n in orders)
