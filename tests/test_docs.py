@@ -27,5 +27,5 @@ def test_a_made_file_is_of_the_scene_as_it_is(name):
 def test_the_blind_study_says_what_it_is_of():
     """Seeds, commit, and a row for each kind of campaign."""
     text = (DOCS / "blind.txt").read_text(encoding="utf-8")
-    assert re.match(r"\d+ campaigns, seeds \d[\d,to\s]*, commit\s+[0-9a-f]{7}", text)
+    assert re.match(r"\d+ campaigns, seeds \d[\d,to\s]*,\s+commit\s+[0-9a-f]{7}", text)
     assert set(re.findall(r"^│ (\w+) ", text, flags=re.M)) >= {*KINDS, "all"}
