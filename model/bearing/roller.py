@@ -130,16 +130,20 @@ class _Zones:
 def with_cage_at(row: RollerRow, displacement: Array, turn: float) -> tuple[Array, Array, Array]:
     """Force (5,), tangent (5, 5) and the load (rows, rollers) N of each roller at a displacement
     (5,), the first roller of each row `turn` rad from x."""
-    azimuth, u = row.azimuths + turn, np.asarray(displacement, float)
-    height = np.array(row.offsets)[:, None, None] + row.length / 2 * SLICES
-    outward = np.zeros((len(row.offsets), row.rollers, SLICES.size, 5))  # radial motion of the outer ring by its displacement
-    c, s = np.cos(azimuth)[:, None], np.sin(azimuth)[:, None]
+    outward, load, slope = at_azimuths(row, np.asarray(displacement, float), row.azimuths + turn)
+    return -np.einsum("jbs,jbsk->k", load, outward), np.einsum("jbs,jbsk,jbsl->kl", slope, outward, outward), load.sum(axis=2).T
+
+
+def at_azimuths(row: RollerRow, displacement: Array, azimuth: Array) -> tuple[Array, Array, Array]:
+    """Of a roller of each row at every `azimuth` (n,), slice by slice: radial motion (n, rows, slices, 5) of the outer ring by
+    its displacement, load (n, rows, slices) N, and the slope of that (N/m) by what presses the slice."""
+    height = np.array(row.offsets)[:, None] + row.length / 2 * SLICES
+    c, s = np.cos(azimuth)[:, None, None], np.sin(azimuth)[:, None, None]
+    outward = np.zeros((len(azimuth), *height.shape, 5))
     outward[..., 0], outward[..., 1], outward[..., 3], outward[..., 4] = c, s, -s * height, c * height
-    pressed = np.maximum(-(outward @ u) - row.clearance / 2, 0.0)
+    pressed = np.maximum(-(outward @ displacement) - row.clearance / 2, 0.0)
     load = row.constant * WEIGHTS / 2 * pressed**EXPONENT
-    slope = EXPONENT * load / np.where(pressed > 0, pressed, 1.0)
-    tangent = np.einsum("bjs,bjsk,bjsl->kl", slope, outward, outward)
-    return -np.einsum("bjs,bjsk->k", load, outward), tangent, load.sum(axis=2)
+    return outward, load, EXPONENT * load / np.where(pressed > 0, pressed, 1.0)
 
 
 def cage_spread(row: RollerRow, displacement: Array) -> float:

@@ -26,7 +26,7 @@ import numpy as np
 
 from thermospindle.model.bearing.ball_row import BallRow, Rolled, at_one_speed, azimuths, centre_line, kinematics, massless, respond
 from thermospindle.model.bearing.heavy_ball.balance import thicker
-from thermospindle.model.bearing.roller import EXPONENT, SLICES, WEIGHTS, RollerRow
+from thermospindle.model.bearing.roller import RollerRow, at_azimuths
 from thermospindle.model.types import Array, ComplexArray
 
 HIGHEST = 6
@@ -132,15 +132,9 @@ def _heavy(fine: BallRow, q: Array, near: Rolled) -> tuple[Array, Array]:
 
 def _of_rollers(row: RollerRow, displacement: tuple[float, ...]) -> Pulls:
     q = np.array(displacement or (0.0,) * 5)
-    height = np.array(row.offsets)[:, None] + row.length / 2 * SLICES  # (rows, slices)
 
     def at(places: int) -> tuple[Array, Array, Array]:
-        azimuth = azimuths(places)[:, None, None]
-        c, s, o = np.cos(azimuth), np.sin(azimuth), np.zeros((places, *height.shape))
-        outward = np.stack([o + c, o + s, o, -s * height, c * height], axis=-1)  # radial motion of the outer ring there, by its displacement
-        pressed = np.maximum(-(outward @ q) - row.clearance / 2, 0.0)
-        load = row.constant * WEIGHTS / 2 * pressed**EXPONENT
-        slope = EXPONENT * load / np.where(pressed > 0, pressed, 1.0)
+        outward, load, slope = at_azimuths(row, q, azimuths(places))
         tangent = np.einsum("jrs,jrsk,jrsl->kl", slope, outward, outward) * row.rollers / places
         return np.einsum("jrs,jrsk->jk", load, outward)[:, :, None], np.einsum("jrs,jrsk->jkr", slope, outward), tangent
 

@@ -93,7 +93,8 @@ def _found(name: str, row: BallRow | RollerRow, displacement: tuple[float, ...],
             add(made[n, k], met.rate(kin) + m * kin.cage, partial(met.line, name, kin, m))
     if displacement:
         size = {line: np.abs(unit * force).max() for line, force in forces.items()}
-        forces = {line: force for line, force in forces.items() if size[line] >= WEAK * max(size.values())}
+        least = WEAK * max(size.values(), default=0.0)
+        forces = {line: force for line, force in forces.items() if size[line] >= least}
     for m, pull in pulls.perfect.items():
         if m % kin.balls == 0:
             add(kin.balls * pull, m * kin.cage, partial(varying_line, name, kin, abs(m)))
