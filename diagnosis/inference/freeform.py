@@ -14,6 +14,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.gaussian import CANNOT
@@ -216,11 +217,34 @@ def _preloaded(sets: list[str]):
     return changed
 
 
-def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, shape: Sequence[float] | None = None) -> bool:
+def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, shape: Sequence[float] | None = None, errors: Array | None = None) -> bool:
     """Whether a free form changes what an effect of the catalogue changes, whatever the law:
     whether in every test the two move all lines in the same direction, to `ALIKE` of their squares.
-    `x` (P,) are the nuisances where that is asked, and `shape` the effect's (neutral unless given)."""
-    return _apart(_by_size(model, x, free), _by_size(model, x, named, shape)) < ALIKE
+    `x` (P,) are the nuisances where that is asked, and `shape` (k,) the effect's (neutral unless given), with standard
+    `errors` (k,) of it: the two do change the same where they do at a shape no more than `CANNOT` of these away."""
+    of_free, of_named = _by_size(model, x, free), _by_size(model, x, named, shape)
+    apart = _apart(of_free, of_named)
+    if apart < ALIKE or errors is None or shape is None or apart >= NEARLY or not errors.any():
+        return apart < ALIKE
+    nearest = _nearest(model, x, of_free, of_named, named, np.asarray(shape, float), CANNOT * errors)
+    return _apart(of_free, _by_size(model, x, named, nearest)) < ALIKE
+
+
+def _nearest(model: CampaignModel, x: Array, of_free: Sequence[Array], of_named: Sequence[Array], named: Mechanism, shape: Array, reach: Array) -> Array:
+    """The shape (k,) within limits and `reach` (k,) of the one given at which, to first order, an effect moves lines most as a free form does."""
+    low, high = (np.clip(shape + way * reach, *np.array([q.limits for q in named.shape]).T) for way in (-1, 1))
+    moved = np.flatnonzero(high > low)
+    columns = []
+    for k in moved:
+        there = shape.copy()
+        there[k] = max(low[k], high[k], key=lambda v, at=shape[k]: abs(v - at))
+        turned = zip(_by_size(model, x, named, there), of_named, strict=True)
+        columns.append(np.concatenate([_beside(f, n - o) for f, (n, o) in zip(of_free, turned, strict=True)]) / (there[k] - shape[k]))
+    left = np.concatenate([_beside(f, n) for f, n in zip(of_free, of_named, strict=True)])
+    found = shape.copy()
+    if len(moved):
+        found[moved] += lsq_linear(np.stack(columns, axis=1), -left, (low[moved] - shape[moved], high[moved] - shape[moved])).x
+    return found
 
 
 def as_told_by(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, sizes: Array) -> Array | None:
@@ -260,12 +284,14 @@ def _shares(of: Sequence[Array], by: Sequence[Array]) -> Array:
 
 def _apart(of_free: Sequence[Array], of_named: Sequence[Array]) -> float:
     """The share of the squares of what an effect moves that a free form's change leaves; all of it where it moves nothing."""
-    apart = whole = 0.0
-    for f, n in zip(of_free, of_named, strict=True):
-        square, other = float(n @ n), float(f @ f)
-        whole += square
-        apart += square - (float(f @ n) ** 2 / other if other else 0.0)
-    return apart / whole if whole > 0 else 1.0
+    whole = sum(float(n @ n) for n in of_named)
+    return sum(float(r @ r) for r in map(_beside, of_free, of_named)) / whole if whole > 0 else 1.0
+
+
+def _beside(form: Array, moved: Array) -> Array:
+    """What is left (N,) of what is `moved` in a test beside a free form of any size there."""
+    square = float(form @ form)
+    return moved - (form @ moved) / square * form if square > 0 else moved
 
 
 def drifting(

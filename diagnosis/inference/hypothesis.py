@@ -62,6 +62,17 @@ class Hypothesis:
         return tuple((np.abs(self.evidence.sizes - neutral) <= 3 * errors).all(axis=1).tolist())
 
     @property
+    def shape_errors(self) -> tuple[Array, ...]:
+        """Standard errors of the shape parameters of every mechanism, in their units; none of those that are held at a limit."""
+        errors = np.sqrt(np.diag(self.evidence.covariance))
+        errors[[h.number for h in self.fit.held]] = 0.0
+        found, at = [], len(self.fit.nuisance)
+        for m, root in zip(self.mechanisms, self.fit.roots, strict=True):
+            at += len(root) + len(m.shape)
+            found.append(errors[at - len(m.shape) : at])
+        return tuple(found)
+
+    @property
     def farthest_shape(self) -> float:
         """Of all shape parameters how far the farthest is from what is known of it, in its prior's
         standard deviations; nothing where there are none."""

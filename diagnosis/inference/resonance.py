@@ -69,7 +69,7 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
             best, learned = found.fit, found.evidence.learned
     except FAILED:
         return None
-    return (wider, found) if asked(found, PLENTY, clear) else None
+    return (wider, found) if asked(found, PLENTY, clear) and not found.evidence.rounded else None
 
 
 def _centred(resonance: Resonance, fitted: Array, moves: bool) -> tuple[Resonance, Array]:

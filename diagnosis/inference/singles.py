@@ -33,7 +33,7 @@ from thermospindle.model.types import Array
 
 BEHIND, FAR = 12.0, 200.0  # tempered ln evidence behind the best from which a mechanism is not followed, and from which not even the best two of a kind
 MOST = {"law": 14, "own law": 4, "free": 4}  # mechanisms fitted at most, of the catalogue with their laws and with laws of the data's own, and free forms
-CLOSE = 60.0  # ln evidence behind the best, from which it is not followed where nothing is strained
+CLOSE = 60.0  # ln evidence behind the best, from which what nothing strained has hidden is not followed, nor what would do no better than that
 OWED = {"law": 6, "own law": 2, "free": 1}  # promised by screening and not delivered, fitted once more at most
 OCCAM = 20.0  # ln evidence that a second mechanism of no size may cost at most: less tells of a fit that stalled
 STALLED = 0.1  # of the enlarged errors, which the model without effects must reach if fits are to start from it alone
@@ -124,13 +124,22 @@ def _owed(
 
 
 def _keeping_up(model: CampaignModel, tasks: Sequence[Task], beside: Hypothesis, most: float, expected: Learned, workers) -> list[Task]:
-    """Of some tasks those that keep up with an explanation while errors are still enlarged, from where they are then."""
+    """Of some tasks those that keep up with an explanation while errors are still enlarged, from where they are then: in evidence,
+    or in what the data leave as fitted, for an effect that is a free form's own change has its sizes and shapes to pay for."""
     if not tasks:
         return []
     early = fitted(model, [Task(beside.mechanisms, (beside.fit.point,), -np.inf), *tasks], TEMPERS[-2:-1], beside.fit, most, expected, workers)
-    least = max((h.evidence.ln for h in early), default=np.inf) - BEHIND
     known = with_laws(beside.mechanisms)
-    return [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if h.evidence.ln > least and with_laws(h.mechanisms) != known]
+    near = {h for value in (_ln, _as_fitted) for h in early if value(h) > max(map(value, early)) - BEHIND}
+    return [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if h in near and with_laws(h.mechanisms) != known]
+
+
+def _ln(h: Hypothesis) -> float:
+    return h.evidence.ln
+
+
+def _as_fitted(h: Hypothesis) -> float:
+    return h.evidence.as_fitted
 
 
 def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanisms: Sequence[Mechanism], workers) -> list[Hypothesis]:
@@ -139,7 +148,7 @@ def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanis
     not have seen it. Not where that is far behind the best; and to the end what keeps up while errors are still enlarged."""
     told = max((h for h in tried.singles if h.free), key=lambda h: h.evidence.ln, default=none)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
-    if not told.free or told.evidence.ln < max(none.evidence.ln + PLENTY, best.evidence.ln - FAR):
+    if not told.free or told.evidence.ln < max(none.evidence.ln + PLENTY, best.evidence.ln - CLOSE):
         return []
     reached = {h.names[0]: h.evidence.ln for h in sorted(tried.singles, key=lambda h: h.evidence.ln)}
     tasks = []
