@@ -227,7 +227,7 @@ def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, sha
     if apart < ALIKE or errors is None or shape is None or apart >= NEARLY or not errors.any():
         return apart < ALIKE
     nearest = _nearest(model, x, of_free, of_named, named, np.asarray(shape, float), CANNOT * errors)
-    return _apart(of_free, _by_size(model, x, named, nearest)) < ALIKE
+    return _apart(of_free, _by_size(model, x, named, nearest.tolist())) < ALIKE
 
 
 def _nearest(model: CampaignModel, x: Array, of_free: Sequence[Array], of_named: Sequence[Array], named: Mechanism, shape: Array, reach: Array) -> Array:
@@ -237,8 +237,8 @@ def _nearest(model: CampaignModel, x: Array, of_free: Sequence[Array], of_named:
     columns = []
     for k in moved:
         there = shape.copy()
-        there[k] = max(low[k], high[k], key=lambda v, at=shape[k]: abs(v - at))
-        turned = zip(_by_size(model, x, named, there), of_named, strict=True)
+        there[k] = high[k] if high[k] - shape[k] > shape[k] - low[k] else low[k]
+        turned = zip(_by_size(model, x, named, there.tolist()), of_named, strict=True)
         columns.append(np.concatenate([_beside(f, n - o) for f, (n, o) in zip(of_free, turned, strict=True)]) / (there[k] - shape[k]))
     left = np.concatenate([_beside(f, n) for f, n in zip(of_free, of_named, strict=True)])
     found = shape.copy()

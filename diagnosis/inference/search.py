@@ -220,7 +220,12 @@ def _finalists(found: Sequence[Hypothesis]) -> list[Hypothesis]:
 def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:
     """Of every free form in a hypothesis the effects in others that change the same, with shapes
     that are those which they were fitted, as far as data tell, and could by another law."""
-    fitted = [(m, *told) for h in reversed(hypotheses) for m, *told in zip(h.mechanisms, h.fit.shapes, h.shape_errors, strict=True)]  # the best one's last
-    every = {m.name: (m, shape, errors) for m, shape, errors in fitted}
+    every: dict[str, tuple[Mechanism, tuple[float, ...], Array]] = {}
+    for h in reversed(hypotheses):  # the best one's last
+        every |= {m.name: (m, shape, errors) for m, shape, errors in zip(h.mechanisms, h.fit.shapes, h.shape_errors, strict=True)}
     free, named = ([row for row in every.values() if row[0].free == kind] for kind in (True, False))
-    return {f.name: frozenset(m.name for m, *told in named if not m.effect.lasting and alike(model, x, f, m, *told)) for f, *_ in free}
+
+    def same(form: Mechanism) -> frozenset[str]:
+        return frozenset(m.name for m, shape, errors in named if not m.effect.lasting and alike(model, x, form, m, shape, errors))
+
+    return {form.name: same(form) for form, *_ in free}

@@ -129,17 +129,10 @@ def _keeping_up(model: CampaignModel, tasks: Sequence[Task], beside: Hypothesis,
     if not tasks:
         return []
     early = fitted(model, [Task(beside.mechanisms, (beside.fit.point,), -np.inf), *tasks], TEMPERS[-2:-1], beside.fit, most, expected, workers)
+    most_ln, most_fitted = (max((getattr(h.evidence, of) for h in early), default=np.inf) for of in ("ln", "as_fitted"))
+    near = [h for h in early if h.evidence.ln > most_ln - BEHIND or h.evidence.as_fitted > most_fitted - BEHIND]
     known = with_laws(beside.mechanisms)
-    near = {h for value in (_ln, _as_fitted) for h in early if value(h) > max(map(value, early)) - BEHIND}
-    return [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if h in near and with_laws(h.mechanisms) != known]
-
-
-def _ln(h: Hypothesis) -> float:
-    return h.evidence.ln
-
-
-def _as_fitted(h: Hypothesis) -> float:
-    return h.evidence.as_fitted
+    return [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in near if with_laws(h.mechanisms) != known]
 
 
 def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanisms: Sequence[Mechanism], workers) -> list[Hypothesis]:

@@ -273,6 +273,25 @@ def test_what_promised_most_at_first_is_followed_until_one_explains_the_data(mon
     assert asked == [{"a", "b"}, alive, alive]
 
 
+@pytest.mark.parametrize(("behind", "pays", "kept"), [(5.0, 5.0, True), (13.0, 12.0, True), (13.0, 0.0, False)])
+def test_what_an_effect_pays_for_its_sizes_and_shapes_does_not_keep_it_back(monkeypatch, behind, pays, kept):
+    """Blind campaign 3454: a flange that softened by its own law was 13.5 in ln evidence behind the free form that it is, 12 of
+    them for sizes and shapes, while errors were enlarged, and not followed: the answer was something unknown."""
+    form, effect = mechanism("form"), mechanism("effect")
+
+    def fitted(model, tasks, tempers, *of, **more):
+        left = {"form": (0.0, 0.0), "effect": (-behind, pays - behind)}
+        return [
+            SimpleNamespace(mechanisms=(m,), evidence=SimpleNamespace(ln=left[m.name][0], as_fitted=left[m.name][1]), fit=SimpleNamespace(point=np.zeros(2)))
+            for m in (t.mechanisms[0] for t in tasks)
+        ]
+
+    monkeypatch.setattr(singles, "fitted", fitted)
+    beside = SimpleNamespace(mechanisms=(form,), fit=SimpleNamespace(point=np.zeros(2)))
+    found = singles._keeping_up(None, [Task((effect,), (np.zeros(2),), -np.inf)], beside, np.inf, Learned({}, 1.0), 1)
+    assert [t.mechanisms[0].name for t in found] == ["effect"] * kept
+
+
 def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):
     """A campaign of another's, with an absorber, left it at a chi2 of 729 a number, and bearing
     damping of 0 +- 6 % at 1.2. An effect that does something says nothing of it."""

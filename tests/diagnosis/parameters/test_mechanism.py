@@ -175,6 +175,17 @@ def test_a_free_form_is_alike_to_effects_that_change_the_same(spindle, model, fo
     assert {m.name for m in named if alike(model, np.zeros(len(model.parameters)), free, m)} == names
 
 
+@pytest.mark.parametrize(("errors", "same"), [((0.02, 0.004), True), ((0.002, 4e-4), False), ((0.0, 0.0), False)])
+def test_a_free_form_is_alike_to_an_effect_at_shapes_that_the_data_do_not_tell_from_those_fitted(spindle, model, errors, same):
+    """Blind campaign 3426: a flange that was softer was found with 0.96 of it in translations, by noise, and then counted as something else."""
+    x, free = np.zeros(len(model.parameters)), next(m for m in free_forms(spindle) if m.name == "flange stiffness")
+    flange = with_own_laws(variants(by_name("flange_fit_loosening")), spindle, CONDITIONS)[0]
+    assert [q.name for q in flange.shape] == ["translation_share", "loss_factor"]
+    assert alike(model, x, free, flange, (1.0, 0.02))
+    assert not alike(model, x, free, flange, (0.95, 0.015))
+    assert alike(model, x, free, flange, (0.95, 0.015), np.array(errors)) == same
+
+
 def test_a_free_form_says_how_much_of_an_effect_that_would_be(spindle, model):
     """A preload lower by 2 % and by 4 % (of ln) is a loss of so much, to first order; of what changes otherwise it says nothing."""
     x, free = np.zeros(len(model.parameters)), {m.name: m for m in free_forms(spindle)}
