@@ -94,10 +94,10 @@ def _beside(spindle: Spindle, seen: Seen, points: tuple[Point, ...]) -> RunoutBe
     assert record is not None
     slowest = int(ratios.argmin())
     check_revolutions(f"tests.{seen.test.id}: runout", record, turning * ratios[slowest], f" of what node {seen.nodes[slowest]} sees,")
-    own = phasors(point, point.imperfections, [by_node[n] for n in seen.nodes])
+    own = phasors(point, point.imperfections, [by_node[n] for n in seen.nodes], perfect=True)
     balls = {b.name: b.balls for b in point.spindle.rolling}
     random = np.random.default_rng(0)
-    starts = [phasors(point, set_down(point.imperfections, balls, random), [by_node[n] for n in seen.nodes]) for _ in range(STARTS)]
+    starts = [phasors(point, set_down(point.imperfections, balls, random), [by_node[n] for n in seen.nodes], perfect=True) for _ in range(STARTS)]
     builds = scatter(spindle, point, [by_node[n] for n in seen.nodes])
     nothing = np.zeros(len(seen.nodes), complex)
     found, waves = [], []

@@ -96,9 +96,10 @@ class FamilyFit:
 def families(seen: Sequence[Seen], found: Sources) -> list[Family]:
     """The lines of all tests, parted into families."""
     of_key: dict[Key, set[Key]] = {}
+    known = {key for key, _ in found.shown}
     for s in seen:
         for line in s.seen:
-            keys = {key_of(g) for g in line.lines if (key_of(g), "first") in found.shown}
+            keys = {key_of(g) for g in line.lines} & known
             joined = set().union(keys, *(of_key.get(k, set()) for k in keys))
             for k in joined:
                 of_key[k] = joined
@@ -158,10 +159,8 @@ def _family(seen: Sequence[Seen], found: Sources, keys: set[Key]) -> Family | No
 
 def _kind_of(key: Key) -> str:
     """What names a group in every test: the cause and the multiple that fix the frequency."""
-    _, cause, _, name, _ = key
-    if cause in ("ball size", "cage unbalance"):
-        return "fc"
-    if cause == "ball waviness":
+    _, cause, _, name = key
+    if name.endswith("fc") or cause == "ball waviness":  # the cage's clock, and what a ball adds to it
         return name
     return name if " - f" in name or " + f" in name or "(" in name else f"{cause} {name}"
 

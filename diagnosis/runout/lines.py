@@ -26,6 +26,7 @@ from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running.lines import TOGETHER, Fit, fit, groups
 
 MULTIPLE = 4  # of the number of balls and of even ball orders: highest lines looked for
+HALF = 1000  # of ball sizes, and race waves of low order, all that half the balls allow: displaced rings feel them at low frequencies, and they are large
 REACH = {"none": 1, "hann": 2, "flattop": 4}  # bins on either side that hold a line of a spectrum: those that share bins are one
 OF_BINS = 0.04  # relative error of an amplitude from bins
 AROUND = 15  # bins on either side from which the floor around a line is estimated
@@ -39,12 +40,12 @@ STANDS_OUT = 30.0  # squared amplitude over the median around it from which a pe
 STRONG = 0.03  # of the strongest line of its probe: an unexplained line is at least so strong
 MOST = 12  # unexplained lines looked for
 
-Key = tuple[str, str, int, str, str]
-"""What names a line at every speed and temperature: bearing, cause, order, name, direction."""
+Key = tuple[str, str, int, str]
+"""What names a line at every speed and temperature: bearing, cause, order, name."""
 
 
 def key_of(line: Line) -> Key:
-    return line.bearing, line.cause, line.order, line.name, line.direction
+    return line.bearing, line.cause, line.order, line.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ def look(spindle: Spindle, test: Test) -> Seen:
 
     def at(slip: float) -> tuple[list[list[Line]], Array]:
         """Lines of the bearings that slip so, those that are one in the record together, and their frequencies (k,)."""
-        known = [line for line in lines(point.spindle, slipped(kin, slip), condition.speed, MULTIPLE) if line.frequency < limit]
+        known = [line for line in known_lines(point.spindle, slipped(kin, slip), condition.speed) if line.frequency < limit]
         clusters = _clusters(known, together)
         return clusters, np.array([float(np.mean(sorted({g.frequency for g in cluster}))) for cluster in clusters])
 
@@ -122,7 +123,7 @@ def look(spindle: Spindle, test: Test) -> Seen:
         phasor, sd = _summed(record, frequency)
         sd = np.hypot(sd, OF_BINS * np.abs(phasor))
         unexplained = ()
-    further = lines(point.spindle, slipped(kin, slip + APART), condition.speed, MULTIPLE)
+    further = known_lines(point.spindle, slipped(kin, slip + APART), condition.speed)
     moved = {key_of(g): g.frequency for g in further}
     uncertain = [max(abs(moved.get(key_of(g), g.frequency) - g.frequency) for g in cluster) for cluster in clusters]
     sd = np.sqrt(sd**2 + _form(clusters, frequency, np.abs(phasor), record.length, np.array(uncertain)) ** 2)
@@ -138,7 +139,7 @@ def expected(spindle: Spindle, condition: Condition, nodes: tuple[int, ...], sec
     point = operating_point(spindle, condition)
     kin = row_kinematics(point.spindle, point.state)
     reach = max(record.highest / 1.1, highest_of_first(point.spindle, kin, condition.speed))
-    known = [line for line in lines(point.spindle, slipped(kin, like.slip), condition.speed, MULTIPLE) if line.frequency < reach]
+    known = [line for line in known_lines(point.spindle, slipped(kin, like.slip), condition.speed) if line.frequency < reach]
     together = TOGETHER if record.kind == "time" else 2.0 * REACH[record.window] + 1
     noise = np.median([line.sd for line in like.seen], axis=0) * np.sqrt(record.length / seconds)
     sd = np.array([noise[like.nodes.index(n)] if n in like.nodes else np.median(noise) for n in nodes])
@@ -147,6 +148,17 @@ def expected(spindle: Spindle, condition: Condition, nodes: tuple[int, ...], sec
         frequency = float(np.mean(sorted({g.frequency for g in cluster})))
         found.append(SeenLine(frequency, tuple(cluster), np.zeros(len(nodes), complex), sd))
     return Seen(Test("planned", condition.temperature, condition.speed), condition, nodes, tuple(found), (), like.slip, like.phased)
+
+
+def known_lines(spindle: Spindle, kin: Mapping[str, Kinematics], speed: float) -> list[Line]:
+    """The lines of theory that are looked for, each once: what an imperfection does across the axis
+    and along it, where displaced rings make it do both, is one line."""
+    found: dict[Key, Line] = {}
+    for line in lines(spindle, kin, speed, MULTIPLE, slow_ones=HALF):
+        other = found.setdefault(key_of(line), line)
+        if other.direction != line.direction:
+            found[key_of(line)] = replace(other, direction="radial and axial")
+    return list(found.values())
 
 
 def highest_of_first(spindle: Spindle, kin: Mapping[str, Kinematics], speed: float) -> float:

@@ -1,7 +1,8 @@
 """What every possible imperfection of a spindle would show at the probes of runout tests, and how large each is likely to be.
 
 A *source* is one kind of imperfection seen in one line: an unbalance, a wave of one order on one race, radial or
-axial, the sizes of the balls of a row, their waves, a cage. What a source shows is linear in its complex amplitude.
+axial, the sizes of the balls of a row, their waves, a cage; between rings that a radial load or weight displaces also what
+a perfect row does as its balls pass, once. What a source shows is linear in its complex amplitude.
 That amplitude is unknown: a scene's imperfections are one draw, of which another spindle of the drawing has only the
 size. Its likely size (rms) is the scene's own, pooled over rings, bearings and orders, races falling as 1/order and
 balls as 1/order^2 as in `model.built.drawn`; where a scene has none of a kind, that of its grade "high precision".
@@ -15,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, key_of
+from thermospindle.model.bearing.kinematics import SIDEBANDS, VARYING
 from thermospindle.model.built.drawn import GRADES, held_over
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.carrier import named, permissible_unbalance, unbalanced
 from thermospindle.model.drawing.measuring import Point
-from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.types import Array, ComplexArray
@@ -32,8 +33,10 @@ from thermospindle.sim.running.excitation import at_speed, chain_response, excit
 GRADE = GRADES["high precision"]
 ECCENTRIC = 0.1e-6  # m, rms eccentricity of a race where the scene gives none
 CAGE = 4e-9  # kg m, rms unbalance of a cage where the scene gives none: 0.5 g that is 8 um off centre
-FIRST, SECOND = "first", "second"
-"""Two sources share a line of a race (a radial and an axial wave) and of the turning part (static and couple unbalance)."""
+VARIES = 0.1  # of what a perfect row does between displaced rings, by which it may do otherwise: a load is not known better
+FIRST, SECOND, PERFECT = "first", "second", "perfect"
+"""Two sources share a line of a race (a radial and an axial wave) and of the turning part (static and couple unbalance);
+what a perfect row does is one by itself."""
 
 SourceKey = tuple[Key, str]
 
@@ -80,35 +83,31 @@ def _all(spindle: Spindle, at: Sequence[OperatingPoint], probes: Sequence[Sequen
     found: dict[SourceKey, ComplexArray] = {}
     for which, unit in units(spindle).items():
         for t, point in enumerate(at):
-            for key, value in phasors(point, unit, probes[t]).items():
+            for key, value in phasors(point, unit, probes[t], which == PERFECT).items():
                 found.setdefault((key, which), np.zeros((len(at), width), complex))[t, : len(value)] = value
     return found
 
 
-def phasors(point: OperatingPoint, imperfections: Imperfections, probes: Sequence[Point]) -> dict[Key, ComplexArray]:
-    """Phasors (probes,) m of every line that imperfections would excite at a point."""
-    _check_centred(point)
-    forces = at_speed(excitation(point, imperfections), 1.0)
+def phasors(point: OperatingPoint, imperfections: Imperfections, probes: Sequence[Point], perfect: bool = False) -> dict[Key, ComplexArray]:
+    """Phasors (probes,) m of every line that imperfections would excite at a point; with `perfect` what perfect
+    rows do between displaced rings is among them."""
+    every = excitation(point, imperfections)
+    forces = at_speed(every if perfect else every.without(VARYING), 1.0)
     moved = chain_response(point.chain, forces)
     rows = np.array([np.array(p.direction) @ motion_rows(point.chain, p.body, p.position)[:3] for p in probes])
-    return {key_of(line): rows @ one for line, one in zip(forces.line, moved, strict=True)}
-
-
-def _check_centred(point: OperatingPoint) -> None:
-    """`BadInput` where radial loads or weight displace rings: sidebands, and what a perfect row does there, are no sources of their own."""
-    spindle = point.spindle
-    if any(any(b.displacement) for b in point.state.rolling):
-        told = spindle.radial_loads[0].told if spindle.radial_loads else f"gravity_m_per_s2 = [{spindle.gravity[0]:g}, {spindle.gravity[1]:g}]"
-        raise BadInput(f"{spindle.file or spindle.name}: {told}: runout tests are compared with centred rings alone, and this displaces them; take it out, or leave the runout tests out")
+    found: dict[Key, ComplexArray] = {}
+    for line, one in zip(forces.line, moved, strict=True):
+        found[key_of(line)] = found.get(key_of(line), 0) + rows @ one
+    return found
 
 
 def scatter(spindle: Spindle, point: OperatingPoint, probes: Sequence[Point]) -> dict[Key, Array]:
-    """Variance (probes,) m2 of every line among spindles of this drawing: what its sources of their likely sizes show."""
+    """Variance (probes,) m2 of every line among spindles of this drawing: what its sources of their
+    likely sizes show, and what perfect rows do of another load."""
     found: dict[Key, Array] = {}
     for source, value in _all(spindle, [point], [probes], len(probes)).items():
-        found[source[0]] = (
-            found.get(source[0], np.zeros(len(probes))) + np.abs(_likely(spindle, point.imperfections, source) * value[0]) ** 2
-        )
+        varies = VARIES if source[1] == PERFECT else _likely(spindle, point.imperfections, source)
+        found[source[0]] = found.get(source[0], np.zeros(len(probes))) + np.abs(varies * value[0]) ** 2
     return found
 
 
@@ -117,7 +116,8 @@ def units(spindle: Spindle) -> dict[str, Imperfections]:
     body = unbalanced(spindle)
     first, second = {}, {}
     for b in spindle.rolling:
-        orders = [1, *(k * b.balls + by for k in range(1, MULTIPLE + 1) for by in (-1, 0, 1))]
+        sides = range(-SIDEBANDS, SIDEBANDS + 1)  # and those of low order: of which centred rings feel no further than -1 to 1
+        orders = sorted({*range(1, b.balls // 2 + 1), *(k * b.balls + by for k in range(1, MULTIPLE + 1) for by in sides)})
         waves = tuple(Wave(n, 1.0, 0.0) for n in orders)
         balls = (tuple(Wave(n, 1.0, 0.0) for n in range(2, 2 * MULTIPLE + 1, 2)), *[()] * (b.elements - 1))
         first[b.name] = RowImperfections(waves, (), waves, (), (1.0, *[0.0] * (b.elements - 1)), balls, 1.0)
@@ -126,6 +126,7 @@ def units(spindle: Spindle) -> dict[str, Imperfections]:
     return {
         FIRST: Imperfections(1.0, body.z, bearings=first, unbalance_body=part),
         SECOND: Imperfections(unbalance_z=body.z, couple_unbalance=1.0, bearings=second, unbalance_body=part),
+        PERFECT: Imperfections(),
     }
 
 
@@ -161,8 +162,10 @@ def of_effect(found: Sources, effect: Effect, values: Values) -> dict[SourceKey,
 
 def _likely(spindle: Spindle, made: Imperfections, source: SourceKey) -> float:
     """The rms amplitude of a source: the scene's level of its kind, or what the scene and its effects have of it, whichever is more."""
-    (bearing, cause, order, _, _), which = source
+    (bearing, cause, order, _), which = source
     scene = spindle.imperfections
+    if which == PERFECT:
+        return 1.0
     if cause == "unbalance":
         body, span = unbalanced(spindle), held_over(spindle)
         static = 0.5 * permissible_unbalance(spindle, body, GRADE.balance)

@@ -8,10 +8,12 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.diagnosis.runout.explanation import Explanation
+from thermospindle.diagnosis.runout.lines import key_of
 from thermospindle.diagnosis.runout.moved import MovedLine, leading, moved_lines
 from thermospindle.diagnosis.runout.next_test import NextRunout
 from thermospindle.diagnosis.runout.sources import SourceKey
 from thermospindle.diagnosis.runout.verdict import CLEAR, RunoutDiagnosis
+from thermospindle.model.bearing.kinematics import VARYING
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM, TO_UM, in_rpm
 from thermospindle.report.text.diagnosis.answer import named
@@ -21,7 +23,7 @@ from thermospindle.sim.effects.effect import Effect
 
 SHOWN = 12  # candidates
 LARGE = 3.0  # likely sizes from which a source is named
-UNITS = {"unbalance": ("g mm", 1e6), "cage unbalance": ("g mm", 1e6)}
+UNITS = {"unbalance": ("g mm", 1e6), "cage unbalance": ("g mm", 1e6), VARYING: ("times", 1.0)}
 """Unit of a source and its size in SI's; nm for all others."""
 
 
@@ -116,9 +118,9 @@ def _candidate(e: Explanation, spindle: Spindle) -> dict[str, Any]:
     }
 
 
-def source_words(source: SourceKey) -> tuple[str, str]:
-    """Where a source is, and the line it shows."""
-    (bearing, cause, order, name, direction), _ = source
+def source_words(source: SourceKey, direction: str) -> tuple[str, str]:
+    """Where a source is, and the line it shows, which moves in a `direction`."""
+    (bearing, cause, order, name), _ = source
     place = f"{bearing} bearing, {cause}" if bearing else "turning part, unbalance"
     return place + (f" of order {order}" if order else ""), f"{name}, {direction}"
 
@@ -126,10 +128,11 @@ def source_words(source: SourceKey) -> tuple[str, str]:
 def where(d: RunoutDiagnosis) -> list[dict[str, Any]]:
     """Sources that have far more than the scene gives, without any effect: which, how large against its likely size, in which line."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
+    directions = {key_of(g): g.direction for s in d.seen for line in s.seen for g in line.lines}
     for family, fit in zip(d.families, d.base, strict=True):
         for (source, test), likely, z in zip(family.source, family.likely, np.abs(fit.amplitude), strict=True):
             if z > LARGE:
-                place, line = source_words(source)
+                place, line = source_words(source, directions[source[0]])
                 unit, factor = UNITS.get(source[0][1], ("nm", 1e9))
                 drift = found.setdefault((place, line), {"element": place, "change": [], "with": line, "relative": 0.0})
                 at = {} if test is None else {"test": d.seen[test].test.id}

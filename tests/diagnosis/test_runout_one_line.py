@@ -12,7 +12,7 @@ from thermospindle.diagnosis.runout.moved import moved_lines
 from thermospindle.diagnosis.runout.verdict import _information
 from thermospindle.model.bearing.kinematics import Line
 
-KEY = ("front", "inner waviness", 3, "3x", "radial")
+KEY = ("front", "inner waviness", 3, "3x")
 LIKELY, PRIOR = 1.5, 3.0
 
 
@@ -77,7 +77,7 @@ def test_the_information_of_a_size_is_that_of_its_real_and_imaginary_parts():
 
 def test_a_moved_line_by_hand():
     """Scene 3 and effect 4 are 5 together by chance of their angle; the amplitude of y has half the square of its error."""
-    line = Line(*KEY[:4], "radial", 1, 150.0)
+    line = Line(*KEY, "radial", 1, 150.0)
     seen = SimpleNamespace(test=SimpleNamespace(id="hot"), condition=SimpleNamespace(speed=-100 * np.pi), seen=(SimpleNamespace(lines=(line,)),))
     [moved] = moved_lines(SimpleNamespace(families=(family([3.0 + 4.0j], [2.0], [0.2]),), seen=(seen,)), explained(2.0))
     assert (moved.scene, moved.with_effect, moved.measured) == pytest.approx((3.0, 5.0, 5.0))

@@ -11,14 +11,12 @@ import pytest
 
 from tests.conftest import ROOT
 from thermospindle.cli import main
-from thermospindle.diagnosis.runout.sources import phasors
 from thermospindle.model.bearing import ball_row, roller
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow
 from thermospindle.model.bearing.kinematics import VARYING, Kinematics, ball_line, lines, race_line, row_kinematics
 from thermospindle.model.bearing.roller import RollerRow, line_constant
 from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
-from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, RadialLoad, Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.model.types import Array
@@ -287,9 +285,3 @@ def test_a_map_has_the_sidebands(lying):
 def test_a_margin_counts_sidebands(lying):
     with pytest.raises(AssertionError, match=r"4 fb - 2 fc"):
         assert_margin(lying, mode=1, speed_rpm=6004, at_least_percent=0.2, temperatures_C=[20.0])
-
-
-def test_runout_tests_are_compared_with_centred_rings_alone(lying):
-    point = operating_point(load(lying), Condition(20.0, SPIN))
-    with pytest.raises(BadInput, match=r"spindle.toml: radial_load_N = \[8, -2\]: runout tests are compared with centred rings alone"):
-        phasors(point, drawn(point.spindle, 1), [])
