@@ -194,10 +194,15 @@ def _with_inertia(row: BallRow, line: Array, near: Rolled | None) -> tuple[tuple
     return values, cage, rolled
 
 
+def as_forces(lever: float) -> Array:
+    """What makes force and moment (5,) of a ring forces alone, N: moments act at a `lever` (m)."""
+    return np.array([1, 1, 1, 1 / lever, 1 / lever])
+
+
 def at_all_places(row: BallRow, displacement: Array) -> tuple[BallRow, int]:
     """A row with its balls at so many places of the cage at once, whose forces are so many times the mean of them; the row itself, and
     1, where no place differs from another, as between rings that press all balls: asked of balls without inertia."""
-    light, scale = replace(row, inertia=None), np.array([1, 1, 1, 1 / row.arm, 1 / row.arm])
+    light, scale = replace(row, inertia=None), as_forces(row.arm)
     alone, between = (respond(replace(light, balls=n * row.balls), displacement).force / n for n in (1, 2))
     changes = np.abs(scale * (between - alone)).max() > CHANGES * np.abs(scale * alone).max()
     return (replace(row, balls=EVERY * row.balls), EVERY) if changes else (row, 1)

@@ -24,7 +24,7 @@ from itertools import count, takewhile
 
 import numpy as np
 
-from thermospindle.model.bearing.ball_row import BallRow, Rolled, at_one_speed, azimuths, centre_line, kinematics, massless, respond
+from thermospindle.model.bearing.ball_row import BallRow, Rolled, as_forces, at_one_speed, azimuths, centre_line, kinematics, massless, respond
 from thermospindle.model.bearing.heavy_ball.balance import thicker
 from thermospindle.model.bearing.roller import RollerRow, at_azimuths
 from thermospindle.model.types import Array, ComplexArray
@@ -92,12 +92,8 @@ def _pulls(at: Callable[[int], tuple[Array, Array, Array]], elements: int, displ
 
 def _beyond(pull: Array, number: int, lever: float) -> float:
     """The largest harmonic from such a number on, of the largest of all."""
-    size = np.abs(np.fft.rfft(_in_newton(pull, lever), axis=0)).max(axis=(1, 2))
+    size = np.abs(np.fft.rfft(pull * as_forces(lever)[:, None], axis=0)).max(axis=(1, 2))
     return float(size[number:].max() / size.max()) if size.any() else 0.0
-
-
-def _in_newton(pull: Array, lever: float) -> Array:
-    return pull * np.array([1, 1, 1, 1 / lever, 1 / lever])[:, None]
 
 
 def _light(fine: BallRow, q: Array) -> tuple[Array, Array]:
@@ -146,7 +142,7 @@ def _harmonics(pull: Array, most: int, lever: float) -> dict[int, ComplexArray]:
     """Harmonics up to number `most` of pulls (places, 5, inputs), those that are something."""
     found = np.fft.fft(pull, axis=0) / len(pull)
     every = {m: found[m] for m in range(-most, most + 1)}
-    size = {m: np.abs(_in_newton(g, lever)) for m, g in every.items()}
+    size = {m: np.abs(g * as_forces(lever)[:, None]) for m, g in every.items()}
     large = NOTHING * np.max([own.max(axis=0) for own in size.values()], axis=0)
     kept = {m: np.where(size[m] > large, g, 0.0) for m, g in every.items()}
     return {m: g for m, g in kept.items() if g.any()}
@@ -154,6 +150,6 @@ def _harmonics(pull: Array, most: int, lever: float) -> dict[int, ComplexArray]:
 
 def _compliance(tangent: Array, lever: float) -> Array:
     """Inverse of a row's tangent, nothing along what it does not resist."""
-    unit = np.array([1, 1, 1, 1 / lever, 1 / lever])
+    unit = as_forces(lever)
     scaled = np.linalg.pinv(tangent * np.outer(unit, unit), rcond=ROUNDED)
     return np.where(np.abs(scaled) > ROUNDED * np.abs(scaled).max(), scaled, 0.0) * np.outer(unit, unit)

@@ -72,7 +72,7 @@ def cage_spread(state: BearingState | RollerState) -> float:
 @lru_cache(maxsize=128)
 def _found(name: str, row: BallRow | RollerRow, displacement: tuple[float, ...], kin: Kinematics, own: RowImperfections) -> dict[Line, ComplexArray]:
     pulls = pulls_of(row, displacement)
-    unit = np.array([1, 1, 1, 1 / pulls.lever, 1 / pulls.lever])
+    unit = ball_row.as_forces(pulls.lever)
     forces: dict[Line, ComplexArray] = {}
 
     def add(force: ComplexArray, speed: float, line: Callable[[str], Line]) -> None:
