@@ -24,7 +24,17 @@ from itertools import count, takewhile
 
 import numpy as np
 
-from thermospindle.model.bearing.ball_row import BallRow, Rolled, as_forces, at_one_speed, azimuths, centre_line, kinematics, massless, respond
+from thermospindle.model.bearing.ball_row import (
+    BallRow,
+    Rolled,
+    as_forces,
+    at_one_speed,
+    azimuths,
+    centre_line,
+    kinematics,
+    massless,
+    respond,
+)
 from thermospindle.model.bearing.heavy_ball.balance import thicker
 from thermospindle.model.bearing.roller import RollerRow, at_azimuths
 from thermospindle.model.types import Array, ComplexArray
