@@ -64,12 +64,12 @@ class Hypothesis:
     @property
     def shape_errors(self) -> tuple[Array, ...]:
         """Standard errors of the shape parameters of every mechanism, in their units; none of those that are held at a limit."""
-        errors = np.sqrt(np.diag(self.evidence.covariance))
+        errors = np.sqrt(np.maximum(np.diag(self.evidence.covariance), 0.0))
         errors[[h.number for h in self.fit.held]] = 0.0
         found, at = [], len(self.fit.nuisance)
         for m, root in zip(self.mechanisms, self.fit.roots, strict=True):
             at += len(root) + len(m.shape)
-            found.append(errors[at - len(m.shape) : at])
+            found.append(errors[at - len(m.shape) : at] * np.array([q.prior_sd for q in m.shape]))
         return tuple(found)
 
     @property

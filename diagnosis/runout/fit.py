@@ -160,7 +160,7 @@ def _family(seen: Sequence[Seen], found: Sources, keys: set[Key]) -> Family | No
 def _kind_of(key: Key) -> str:
     """What names a group in every test: the cause and the multiple that fix the frequency."""
     _, cause, _, name = key
-    if name.endswith("fc") or cause == "ball waviness":  # the cage's clock, and what a ball adds to it
+    if cause in ("ball size", "cage unbalance", "ball waviness"):  # the cage's clock, and what a ball adds to it
         return name
     return name if " - f" in name or " + f" in name or "(" in name else f"{cause} {name}"
 

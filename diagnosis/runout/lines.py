@@ -16,17 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from thermospindle.model.bearing.kinematics import Kinematics, Line, lines, row_kinematics
+from thermospindle.model.bearing.kinematics import SIDEBANDS, Kinematics, Line, lines, row_kinematics
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 from thermospindle.sim.campaign.runout_record import WINDOWS, RunoutRecord
-from thermospindle.sim.operating import operating_point
+from thermospindle.sim.operating import OperatingPoint, operating_point
 from thermospindle.sim.running.lines import TOGETHER, Fit, fit, groups
+from thermospindle.sim.running.pulls import HIGHEST, in_forces, pulls_of
 
 MULTIPLE = 4  # of the number of balls and of even ball orders: highest lines looked for
-HALF = 1000  # of ball sizes, and race waves of low order, all that half the balls allow: displaced rings feel them at low frequencies, and they are large
+FELT = 3e-4  # of the strongest harmonic over azimuth with which displaced rings feel their balls, from which sidebands are looked for
 REACH = {"none": 1, "hann": 2, "flattop": 4}  # bins on either side that hold a line of a spectrum: those that share bins are one
 OF_BINS = 0.04  # relative error of an amplitude from bins
 AROUND = 15  # bins on either side from which the floor around a line is estimated
@@ -109,7 +110,7 @@ def look(spindle: Spindle, test: Test) -> Seen:
 
     def at(slip: float) -> tuple[list[list[Line]], Array]:
         """Lines of the bearings that slip so, those that are one in the record together, and their frequencies (k,)."""
-        known = [line for line in known_lines(point.spindle, slipped(kin, slip), condition.speed) if line.frequency < limit]
+        known = [line for line in known_lines(point, slipped(kin, slip)) if line.frequency < limit]
         clusters = _clusters(known, together)
         return clusters, np.array([float(np.mean(sorted({g.frequency for g in cluster}))) for cluster in clusters])
 
@@ -123,7 +124,7 @@ def look(spindle: Spindle, test: Test) -> Seen:
         phasor, sd = _summed(record, frequency)
         sd = np.hypot(sd, OF_BINS * np.abs(phasor))
         unexplained = ()
-    further = known_lines(point.spindle, slipped(kin, slip + APART), condition.speed)
+    further = known_lines(point, slipped(kin, slip + APART))
     moved = {key_of(g): g.frequency for g in further}
     uncertain = [max(abs(moved.get(key_of(g), g.frequency) - g.frequency) for g in cluster) for cluster in clusters]
     sd = np.sqrt(sd**2 + _form(clusters, frequency, np.abs(phasor), record.length, np.array(uncertain)) ** 2)
@@ -139,7 +140,7 @@ def expected(spindle: Spindle, condition: Condition, nodes: tuple[int, ...], sec
     point = operating_point(spindle, condition)
     kin = row_kinematics(point.spindle, point.state)
     reach = max(record.highest / 1.1, highest_of_first(point.spindle, kin, condition.speed))
-    known = [line for line in known_lines(point.spindle, slipped(kin, like.slip), condition.speed) if line.frequency < reach]
+    known = [line for line in known_lines(point, slipped(kin, like.slip)) if line.frequency < reach]
     together = TOGETHER if record.kind == "time" else 2.0 * REACH[record.window] + 1
     noise = np.median([line.sd for line in like.seen], axis=0) * np.sqrt(record.length / seconds)
     sd = np.array([noise[like.nodes.index(n)] if n in like.nodes else np.median(noise) for n in nodes])
@@ -150,15 +151,33 @@ def expected(spindle: Spindle, condition: Condition, nodes: tuple[int, ...], sec
     return Seen(Test("planned", condition.temperature, condition.speed), condition, nodes, tuple(found), (), like.slip, like.phased)
 
 
-def known_lines(spindle: Spindle, kin: Mapping[str, Kinematics], speed: float) -> list[Line]:
+def felt_sidebands(point: OperatingPoint) -> dict[str, int]:
+    """Of every row with displaced rings up to which sideband these feel their balls, by name; two at least."""
+    found = {}
+    for b in point.state.rolling:
+        if any(b.displacement):
+            size = {m: np.abs(pull).max() for m, pull in in_forces(pulls_of(b.row, b.displacement)).items()}
+            found[b.name] = max([SIDEBANDS, *(abs(m) for m, own in size.items() if own > FELT * max(size.values()))])
+    return found
+
+
+def known_lines(point: OperatingPoint, kin: Mapping[str, Kinematics]) -> list[Line]:
     """The lines of theory that are looked for, each once: what an imperfection does across the axis
     and along it, where displaced rings make it do both, is one line."""
     found: dict[Key, Line] = {}
-    for line in lines(spindle, kin, speed, MULTIPLE, slow_ones=HALF):
+    for line in lines(point.spindle, kin, point.condition.speed, MULTIPLE, felt_sidebands(point), HIGHEST):
         other = found.setdefault(key_of(line), line)
         if other.direction != line.direction:
             found[key_of(line)] = replace(other, direction="radial and axial")
     return list(found.values())
+
+
+def near_lines(point: OperatingPoint) -> set[Key]:
+    """The lines whose sources are weighed: of displaced rows the nearest sidebands, and the cage's multiples. Farther ones
+    of races and balls are only looked for, so that they are not taken for something unknown: they are weak, and many."""
+    kin = row_kinematics(point.spindle, point.state)
+    near = {key_of(line) for line in lines(point.spindle, kin, point.condition.speed, MULTIPLE)}
+    return near | {key_of(line) for line in known_lines(point, kin) if line.cause == "ball size"}
 
 
 def highest_of_first(spindle: Spindle, kin: Mapping[str, Kinematics], speed: float) -> float:

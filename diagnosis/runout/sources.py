@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, key_of
+from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, felt_sidebands, key_of, near_lines
 from thermospindle.model.bearing.kinematics import SIDEBANDS, VARYING
 from thermospindle.model.built.drawn import GRADES, held_over
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
@@ -70,8 +70,8 @@ def sources(spindle: Spindle, seen: Sequence[Seen], points: Sequence[Point]) -> 
         step = 0.3 * parameter.sd
         other = parameter.apply(spindle, step)
         moved = _all(other, [operating_point(other, s.condition) for s in seen], probes, width)
-        for key, value in moved.items():
-            by_tolerance[key][k] = (value - shown[key]) / step
+        for key, value in shown.items():  # a weak line that only one of the two has is left as it is
+            by_tolerance[key][k] = (moved.get(key, value) - value) / step
     likely = {key: _likely(spindle, nominal[0].imperfections, key) for key in shown}
     ratios = tuple(sorted({abs(b.speed_ratio) for b in spindle.structure.bodies if b.turns and b.speed_ratio}))
     return Sources(
@@ -79,11 +79,16 @@ def sources(spindle: Spindle, seen: Sequence[Seen], points: Sequence[Point]) -> 
     )
 
 
-def _all(spindle: Spindle, at: Sequence[OperatingPoint], probes: Sequence[Sequence[Point]], width: int) -> dict[SourceKey, ComplexArray]:
+def _all(
+    spindle: Spindle, at: Sequence[OperatingPoint], probes: Sequence[Sequence[Point]], width: int, far: bool = False
+) -> dict[SourceKey, ComplexArray]:
+    """What every source shows, of lines whose sources are weighed or, with `far`, of all."""
     found: dict[SourceKey, ComplexArray] = {}
-    for which, unit in units(spindle).items():
-        for t, point in enumerate(at):
-            for key, value in phasors(point, unit, probes[t], which == PERFECT).items():
+    for t, point in enumerate(at):
+        weighed = near_lines(point)
+        for which, unit in units(spindle, felt_sidebands(point) if far else {}).items():
+            every = phasors(point, unit, probes[t], which == PERFECT)
+            for key, value in ((key, value) for key, value in every.items() if far or key in weighed or which == PERFECT):
                 found.setdefault((key, which), np.zeros((len(at), width), complex))[t, : len(value)] = value
     return found
 
@@ -105,19 +110,20 @@ def scatter(spindle: Spindle, point: OperatingPoint, probes: Sequence[Point]) ->
     """Variance (probes,) m2 of every line among spindles of this drawing: what its sources of their
     likely sizes show, and what perfect rows do of another load."""
     found: dict[Key, Array] = {}
-    for source, value in _all(spindle, [point], [probes], len(probes)).items():
+    for source, value in _all(spindle, [point], [probes], len(probes), far=True).items():
         varies = VARIES if source[1] == PERFECT else _likely(spindle, point.imperfections, source)
         found[source[0]] = found.get(source[0], np.zeros(len(probes))) + np.abs(varies * value[0]) ** 2
     return found
 
 
-def units(spindle: Spindle) -> dict[str, Imperfections]:
-    """Imperfections in which every source has the amplitude 1."""
+def units(spindle: Spindle, sidebands: Mapping[str, int]) -> dict[str, Imperfections]:
+    """Imperfections in which every source has the amplitude 1, with race waves of so many `sidebands`, by row, or `SIDEBANDS`."""
     body = unbalanced(spindle)
     first, second = {}, {}
     for b in spindle.rolling:
-        sides = range(-SIDEBANDS, SIDEBANDS + 1)  # and those of low order: of which centred rings feel no further than -1 to 1
-        orders = sorted({*range(1, b.balls // 2 + 1), *(k * b.balls + by for k in range(1, MULTIPLE + 1) for by in sides)})
+        most = sidebands.get(b.name, SIDEBANDS)  # of which centred rings feel one
+        sides = range(-most, most + 1)
+        orders = sorted({n for k in range(MULTIPLE + 1) for by in sides if (n := k * b.balls + by) > 0})
         waves = tuple(Wave(n, 1.0, 0.0) for n in orders)
         balls = (tuple(Wave(n, 1.0, 0.0) for n in range(2, 2 * MULTIPLE + 1, 2)), *[()] * (b.elements - 1))
         first[b.name] = RowImperfections(waves, (), waves, (), (1.0, *[0.0] * (b.elements - 1)), balls, 1.0)

@@ -207,11 +207,12 @@ def _line(bearing: str, cause: str, order: int, name: str, direction: str, side:
 
 
 def lines(
-    spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], speed: float, highest_multiple: int = 3, slow_ones: int = SIDEBANDS
+    spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], speed: float, highest_multiple: int = 3,
+    sidebands: Mapping[str, int] | None = None, highest_passing: int = 0,
 ) -> list[Line]:
     """All lines of linear theory for k up to `highest_multiple`, multiples of Z and even ball orders
-    alike, in order of frequency; of displaced rings with `SIDEBANDS`, and of ball sizes and of race waves that are
-    felt as such, k = 0, so many `slow_ones` as half the balls allow.
+    alike, in order of frequency; of a row with displaced rings with so many `sidebands` (by name; `SIDEBANDS`) as half
+    its balls allow, and what its perfect balls do as they pass up to that multiple of Z or to the `highest_passing`.
 
     `speed` (rad/s) is the spindle's, of which what is unbalanced has its own ratio. Orders that
     stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
@@ -219,7 +220,8 @@ def lines(
     found: list[Line] = []
     for name in (b.name for b in spindle.rolling):
         kin = kinematics_by_bearing[name]
-        found += _sidebands(name, kin, highest_multiple, slow_ones) if kin.displaced else _centred(name, kin, highest_multiple)
+        sides = (sidebands or {}).get(name, SIDEBANDS)
+        found += _sidebands(name, kin, highest_multiple, sides, highest_passing) if kin.displaced else _centred(name, kin, highest_multiple)
     found.append(unbalance_line(speed * unbalanced(spindle).speed_ratio))
     return sorted((line for line in found if line.frequency > SMALLEST), key=lambda line: line.frequency)
 
@@ -239,15 +241,14 @@ def _centred(name: str, kin: Kinematics, highest: int) -> Iterator[Line]:
             yield ball_line(name, kin, order, "axial")
 
 
-def _sidebands(name: str, kin: Kinematics, highest: int, slow_ones: int) -> Iterator[Line]:
-    passing = range(kin.balls, highest * kin.balls + 1, kin.balls)
-    most, slowest = (min(n, (kin.balls - 1) // 2) for n in (SIDEBANDS, slow_ones))
+def _sidebands(name: str, kin: Kinematics, highest: int, sidebands: int, highest_passing: int) -> Iterator[Line]:
+    passing, perfect = (range(kin.balls, most * kin.balls + 1, kin.balls) for most in (highest, max(highest, highest_passing)))
+    most = min(sidebands, (kin.balls - 1) // 2)
     sides = range(-most, most + 1)
     yield cage_line(name, kin, "cage unbalance")
     for direction in ("radial", "axial") if kin.angled else ("radial",):
-        yield from (cage_line(name, kin, "ball size", times, direction) for times in range(1, slowest + 1))
-        yield from (varying_line(name, kin, passes, direction) for passes in passing)
+        yield from (cage_line(name, kin, "ball size", times, direction) for times in range(1, most + 1))
+        yield from (varying_line(name, kin, passes, direction) for passes in perfect)
         for ring in ("inner", "outer"):
-            yield from (race_line(name, kin, ring, order, direction, 0) for order in range(1, slowest + 1))
-            yield from (race_line(name, kin, ring, passes + by, direction, passes) for passes in passing for by in sides if passes + by <= passing[-1] + 1)
+            yield from (race_line(name, kin, ring, passes + by, direction, passes) for passes in (0, *passing) for by in sides if 0 < passes + by <= passing[-1] + 1)
         yield from (ball_line(name, kin, order, direction, by) for order in range(2, 2 * highest + 1, 2) for by in sides)

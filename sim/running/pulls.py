@@ -74,6 +74,11 @@ def pulls_of(row: BallRow | RollerRow, displacement: tuple[float, ...] = ()) -> 
     return _of_balls(row, displacement) if isinstance(row, BallRow) else _of_rollers(row, displacement)
 
 
+def in_forces(pulls: Pulls) -> dict[int, ComplexArray]:
+    """Harmonics (5, inputs) of an element's pull as forces alone, N per m of what it meets."""
+    return {m: as_forces(pulls.lever)[:, None] * pull for m, pull in pulls.by.items()}
+
+
 def _of_balls(row: BallRow, displacement: tuple[float, ...]) -> Pulls:
     q = np.array(displacement or (0.0,) * 5)
     near = respond(row).rolled

@@ -292,6 +292,21 @@ def test_what_an_effect_pays_for_its_sizes_and_shapes_does_not_keep_it_back(monk
     assert [t.mechanisms[0].name for t in found] == ["effect"] * kept
 
 
+def test_shapes_are_known_in_their_own_units(spindle):
+    """What the data do not tell of an effect that does nothing is as well known as before: minutes as minutes, a share as a share."""
+    model = model_of(spindle, mode_campaign(spindle, TESTS, 3))
+    for name in ("soak_lag", "flange_fit_loosening", "magnetic_pull"):
+        m = max(variants(effect(name)), key=lambda v: len(v.shape))
+        own = fit(model, [m])
+        h = Hypothesis(own, evidence(model, own))
+        [errors] = h.shape_errors
+        held = {n.number for n in own.held}
+        free = [k for k in range(len(m.shape)) if len(own.point) - len(m.shape) + k not in held]
+        assert free
+        for k, q in enumerate(m.shape):
+            assert errors[k] == (pytest.approx(q.prior_sd, rel=0.3) if k in free else 0.0), (name, q.name)
+
+
 def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):
     """A campaign of another's, with an absorber, left it at a chi2 of 729 a number, and bearing
     damping of 0 +- 6 % at 1.2. An effect that does something says nothing of it."""
