@@ -11,25 +11,32 @@ all balls orbit: the mean of what rolling at the angles of each would make it. W
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import hypot, sqrt
-from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from thermospindle.model.bearing.heavy_ball.balance import LEAST_STRETCH, Balance, Driven, HeavyBall, balance, driven, settled
-from thermospindle.model.bearing.heavy_ball.inertia import BallInertia, Vector, rolling
+from thermospindle.model.bearing.heavy_ball.balance import (
+    LEAST_STRETCH,
+    Balance,
+    Driven,
+    HeavyBall,
+    balance,
+    driven,
+    settled,
+)
+from thermospindle.model.bearing.heavy_ball.inertia import MANY, BallInertia, Vector, rolling
+from thermospindle.model.bearing.heavy_ball.together import at_own_speeds, of_each, settled_together
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
-ROUNDS, STANDING = 20, 1e-12  # of the cage's speed, and what of it is no change
 CHANGES, EVERY = 1e-7, 16
 """Of the force of a row, what is a change as its balls pass; then places of its cage from one ball to the next whose mean is taken."""
 TURNS = 48
@@ -90,10 +97,10 @@ def azimuths(balls: int) -> Array:
 
 @dataclass(frozen=True)
 class Rolled:
-    """Where balls with inertia have settled: the speed of their cage (rad/s), and every ball's centre, (r, z) from the inner groove's (m)."""
+    """Where balls with inertia have settled: the speed of their cage (rad/s), and every ball's centre, r and z (balls,) from the inner groove's (m)."""
 
     cage: float
-    centres: tuple[Vector, ...]
+    centres: Vector
 
 
 @dataclass(frozen=True)
@@ -145,9 +152,19 @@ def respond(row: BallRow, displacement: Array | None = None, near: Rolled | None
 
     `near` is what balls with inertia did at another displacement, from which they are sought.
     """
-    u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
-    line = centre_line(row, u)
-    local, cage, rolled = _with_inertia(row, line, near) if row.heavy else (massless(row, line), None, None)
+    return respond_all([row], [np.zeros(5) if displacement is None else np.asarray(displacement, float)], [near])[0]
+
+
+def respond_all(rows: Sequence[BallRow], displacements: Sequence[Array], near: Sequence[Rolled | None]) -> list[RowForce]:
+    """`respond` of many rows, whose balls with inertia are sought together."""
+    lines = [centre_line(row, u) for row, u in zip(rows, displacements, strict=True)]
+    heavy = [k for k, row in enumerate(rows) if row.heavy]
+    told = at_one_speed([rows[k] for k in heavy], [lines[k] for k in heavy], [near[k] for k in heavy])
+    found = {k: _with_inertia(rows[k], *own) for k, own in zip(heavy, told, strict=True)}
+    return [_of_row(row, *(found.get(k) or (massless(row, lines[k]), None, None))) for k, row in enumerate(rows)]
+
+
+def _of_row(row: BallRow, local: tuple[Array, ...], cage: Cage | None, rolled: Rolled | None) -> RowForce:
     force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
     b = kinematics(row)
     flat = b.reshape(-1, 5)
@@ -179,19 +196,15 @@ class Cage:
     speed_by_line: Array
 
 
-def _with_inertia(row: BallRow, line: Array, near: Rolled | None) -> tuple[tuple[Array, ...], Cage | None, Rolled]:
+def _with_inertia(row: BallRow, speed: float, here: Balance, each: Driven) -> tuple[tuple[Array, ...], Cage | None, Rolled]:
     """As `massless` at the speed of the cage, with the centre of every ball an unknown of its own; and what the cage does as rings move."""
-    lines = [(r, z) for r, z in line.tolist()]
-    speed, found = at_one_speed(row, lines) if near is None else at_one_speed(row, lines, dict(zip(lines, near.centres, strict=True)), near.cage)
-    balances, each = zip(*(found[at] for at in lines), strict=True)
-    stiffness = {at: np.reshape(b.stiffness(), (2, 2)) for at, (b, _) in found.items()}
-    told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
-    values, rolled = (told[:2].T, np.array([stiffness[at] for at in lines]), *told[2:]), Rolled(speed, tuple(b.centre for b in balances))
+    stiffness = np.stack(here.stiffness(), -1).reshape(-1, 2, 2)
+    values = np.stack(here.on_outer, -1), stiffness, here.inner, here.outer, here.inner_angle, here.outer_angle, here.deformation
     if row.inertia is not None and row.inertia.cage is not None:
-        return values, None, rolled
-    by_itself = 1.0 - float(np.mean([d.by_cage for d in each]))
-    cage = Cage(np.array([d.force_by_cage for d in each]), np.array([d.by_line for d in each]) / len(each) / by_itself)
-    return values, cage, rolled
+        return values, None, Rolled(speed, here.centre)
+    by_itself = 1.0 - float(np.mean(each.by_cage))
+    cage = Cage(np.stack(each.force_by_cage, -1), np.stack(each.by_line, -1) / row.balls / by_itself)
+    return values, cage, Rolled(speed, here.centre)
 
 
 def as_forces(lever: float) -> Array:
@@ -229,60 +242,71 @@ def by_own_orbits(row: BallRow, displacement: Array | None = None) -> Array:
         return np.zeros((5, 5))
     held = respond(row, displacement, respond(row).rolled)
     assert held.rolled is not None
-    lines = [(r, z) for r, z in centre_line(row, np.zeros(5) if displacement is None else displacement).tolist()]
-    allowed = tolerances(row, max(hypot(r, z) for r, z in lines))
-    starts = dict(zip(lines, held.rolled.centres, strict=True))
-    alone = {at: np.reshape(settled(row.ball, at, *allowed, start).stiffness(), (2, 2)) for at, start in starts.items()}
+    line = centre_line(row, np.zeros(5) if displacement is None else displacement)
+    alone = _settled(row, line, held.rolled.centres).stiffness()
     b = kinematics(row)
-    tangent = b.reshape(-1, 5).T @ (np.array([alone[at] for at in lines]) @ b).reshape(-1, 5) - held.tangent
+    tangent = b.reshape(-1, 5).T @ (np.stack(alone, -1).reshape(-1, 2, 2) @ b).reshape(-1, 5) - held.tangent
     return np.asarray((tangent + tangent.T) / 2)
 
 
-def at_one_speed(
-    row: BallRow, lines: Sequence[Vector], starts: Mapping[Vector, Vector] = MappingProxyType({}), near: float | None = None
-) -> tuple[float, dict[Vector, tuple[Balance, Driven]]]:
-    """Speed of the cage, and what a ball is at every different one of `lines` (balls, 2) between
-    the groove centres; balls on the same line, as of centred rings, are one. Balls are sought from
-    their `starts`, and the speed from one that is `near`, as far as these are known."""
-    free, weights = row.ball, Counter(lines)
-    allowed = tolerances(row, max(hypot(r, z) for r, z in weights))
-
-    def mean(values: Mapping[Vector, float]) -> float:
-        return sum(n * values[at] for at, n in weights.items()) / len(lines)
-
-    def held(cage: float) -> HeavyBall:
-        return changed(free, inertia=changed(free.inertia, cage=cage))
-
-    def at_speed(ball: HeavyBall, balances: Mapping[Vector, Balance]) -> dict[Vector, tuple[Balance, Driven]]:
-        return {at: (here, driven(ball, here, at)) for at, here in balances.items()}
-
-    if near is None or free.inertia.cage is not None or len(weights) == 1:
-        here = {at: settled(free, at, *allowed, starts.get(at)) for at in weights}
-        if (cage := free.inertia.cage) is not None:
-            return cage, at_speed(free, here)
-        cage = mean({at: rolling(free.inertia, b.centre, at).speed for at, b in here.items()})
-        ball = held(cage)
-        if len(here) == 1:  # it rolls with them
-            return cage, at_speed(ball, {at: balance(ball, b.centre, at) for at, b in here.items()})
-        starts = {at: b.centre for at, b in here.items()}
-    else:
-        cage, ball = near, held(near)
-    for _ in range(ROUNDS):
-        here = {at: settled(ball, at, *allowed, starts.get(at)) for at in weights}
-        starts = {at: b.centre for at, b in here.items()}
-        found = at_speed(ball, here)
-        speed, by_cage = (mean({at: getattr(d, of) for at, (_, d) in found.items()}) for of in ("speed", "by_cage"))
-        step = (speed - cage) / (1.0 - by_cage)
-        if abs(step) <= STANDING * abs(speed):
-            return cage, found
-        cage += step
-        ball = held(cage)
-    raise NoEquilibrium("the speed of a cage did not settle")
+def at_one_speed(rows: Sequence[BallRow], lines: Sequence[Array], near: Sequence[Rolled | None]) -> list[tuple[float, Balance, Driven]]:
+    """Of rows with heavy balls, whose groove centres are apart by `lines` (balls, 2) each, the speed of the cage, and what
+    every ball is, arrays (balls,); sought from where they are `near`, as far as that is known. Raises `NoEquilibrium`."""
+    found = {k: told for k, row in enumerate(rows) if (told := _without_others(row, lines[k], near[k])) is not None}
+    rest = [k for k in range(len(rows)) if k not in found]
+    if rest:
+        rolled = [near[k] or _by_themselves(rows[k], lines[k]) for k in rest]
+        allowed = [tolerances(rows[k], lines[k]) for k in rest]
+        own = at_own_speeds([rows[k].ball for k in rest], [lines[k] for k in rest], allowed, [r.cage for r in rolled], [r.centres for r in rolled])
+        found |= dict(zip(rest, own, strict=True))
+    return [found[k] for k in range(len(rows))]
 
 
-def tolerances(row: BallRow, longest: float) -> tuple[float, float]:
+def _without_others(row: BallRow, line: Array, near: Rolled | None) -> tuple[float, Balance, Driven] | None:
+    """Of a row whose balls all have the same line, or whose cage has a speed that is held; None of another."""
+    starts = None if near is None else near.centres
+    if not np.ptp(line, axis=0).any():
+        start = None if starts is None else (float(starts[0][0]), float(starts[1][0]))
+        cage, *alike = of_alike(row, (float(line[0, 0]), float(line[0, 1])), start)
+        return cage, *(_of_all(one, row.balls) for one in alike)
+    if row.inertia is None or row.inertia.cage is None:
+        return None
+    here = _settled(row, line, starts)
+    return row.inertia.cage, here, driven(row.ball, here, tuple(line.T), MANY)
+
+
+def _by_themselves(row: BallRow, line: Array) -> Rolled:
+    """Where balls settle of which each orbits as fast as it rolls, and their mean speed."""
+    here = _settled(row, line)
+    return Rolled(float(np.mean(rolling(row.ball.inertia, here.centre, tuple(line.T), MANY).speed)), here.centre)
+
+
+def _settled(row: BallRow, line: Array, starts: Vector | None = None) -> Balance:
+    tolerance, least = tolerances(row, line)
+    return settled_together(of_each([row.ball], [row.balls]), tuple(line.T), np.full(row.balls, tolerance), np.full(row.balls, least), starts)
+
+
+def of_alike(row: BallRow, line: Vector, start: Vector | None = None) -> tuple[float, Balance, Driven]:
+    """Speed of the cage of balls that all have the same `line`, and what one of them is: it rolls with them."""
+    ball = row.ball
+    here = settled(ball, line, *tolerances(row, line), start)
+    cage = ball.inertia.cage
+    if cage is None:
+        cage = rolling(ball.inertia, here.centre, line).speed
+        ball = changed(ball, inertia=changed(ball.inertia, cage=cage))
+        here = balance(ball, here.centre, line)
+    return cage, here, driven(ball, here, line)
+
+
+def _of_all(one: Any, balls: int) -> Any:
+    """What one ball is, a tuple of numbers and tuples of them, of as many that are alike."""
+    return type(one)(*(tuple(np.full(balls, x) for x in v) if isinstance(v, tuple) else np.full(balls, v) for v in one))
+
+
+def tolerances(row: BallRow, line: Vector | Array) -> tuple[float, float]:
     """Of the resultant on a settled ball (N), and of the stiffness added to the step of one that
-    touches nothing (N/m); no groove centres are farther apart than `longest` (m)."""
+    touches nothing (N/m), for groove centres apart by a `line`, or by no more than the longest of many (balls, 2)."""
+    longest = float(np.hypot(*line.T).max()) if isinstance(line, np.ndarray) else hypot(*line)
     stretch, flung = max(LEAST_STRETCH, longest - row.unloaded_distance), row.ball.inertia.flung
     contact = row.constant * stretch**1.5
     tolerance, least = 1e-12 * contact + 1e-13 * flung, 1e-9 * row.constant * sqrt(stretch)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermospindle.model.bearing.ball_row import BallRow, at_one_speed, kinematics_of, tolerances
+from thermospindle.model.bearing.ball_row import BallRow, kinematics_of, of_alike, tolerances
 from thermospindle.model.bearing.heavy_ball.balance import settled, spring
 from thermospindle.model.bearing.heavy_ball.inertia import Vector
 from thermospindle.model.types import Array
@@ -40,9 +40,7 @@ def centred(row: BallRow, centre: Vector | None = None) -> Centred:
         sine, angle = row.axial / length, atan2(abs(row.axial), row.radial)
         tangent = np.array(spring((-row.radial / length, sine), along, force / length)) @ squares
         return Centred(row.balls * force * sine, tangent.reshape(5, 5), force, force, angle, angle, deformation)
-    line = -row.radial, row.axial
-    _, found = at_one_speed(row, [line], {} if centre is None else {line: centre})
-    ball, driven = found[line]
+    _, ball, driven = of_alike(row, (-row.radial, row.axial), centre)
     tangent = (np.array(ball.stiffness()) @ squares).reshape(5, 5)
     if row.inertia is not None and row.inertia.cage is None:  # it turns with what it drives
         tangent += np.outer(np.array(driven.force_by_cage) @ sums, np.array(driven.by_line) @ sums) / (row.balls * (1.0 - driven.by_cage))
@@ -71,7 +69,7 @@ def centred_axial(row: BallRow, movement: float, centres: Centres | None = None)
     if row.heavy:
         centres = {} if centres is None else centres
         line = -row.radial, axial
-        found = settled(row.ball, line, *tolerances(row, hypot(*line)), centres.get(id(row)))  # all balls roll alike, and the cage with them
+        found = settled(row.ball, line, *tolerances(row, line), centres.get(id(row)))  # all balls roll alike, and the cage with them
         centres[id(row)] = found.centre
         return row.balls * found.on_outer[1], row.balls * found.stiffness()[3]
     length, _, force, along = _pull(row, axial)

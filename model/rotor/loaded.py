@@ -11,15 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy
 
 from thermospindle.model.bearing import ball_row, roller
-from thermospindle.model.bearing.ball_row import BallRow
+from thermospindle.model.bearing.ball_row import BallRow, Rolled, RowForce
 from thermospindle.model.bearing.definitions import BearingSet
 from thermospindle.model.bearing.pair import BearingState, PairState
-from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.bearing.roller import RollerRow, RollerState
 from thermospindle.model.bearing.state import LinearState
 from thermospindle.model.carrier import load_carrier
 from thermospindle.model.errors import NoEquilibrium
@@ -37,14 +38,44 @@ SLACK = 1.0
 
 @dataclass(frozen=True)
 class _Row:
-    """A row in the structure: `b` (5, n) as above; force and tangent of its displacement, these
-    `light` without ball inertia, and so its `energy`."""
+    """A row of balls, at so many `places` of the cage (`ball_row.at_all_places`), or of rollers; `b` (m, n) as above."""
 
-    name: str
     b: Array
-    answer: Callable[[Array], tuple[Array, Array]]
-    light: Callable[[Array], tuple[Array, Array]]
-    energy: Callable[[Array], float]
+    row: BallRow | RollerRow
+    places: int = 1
+
+    def light(self, q: Array) -> tuple[Array, Array]:
+        """Force and tangent of a displacement without ball inertia."""
+        if isinstance(self.row, RollerRow):
+            rolled = roller.respond(self.row, q)
+            return rolled.force, rolled.tangent
+        found = ball_row.respond(replace(self.row, inertia=None), q)
+        return found.force / self.places, found.tangent / self.places
+
+    def energy(self, q: Array) -> float:
+        """Of a displacement, without ball inertia."""
+        return roller.energy(self.row, q) if isinstance(self.row, RollerRow) else ball_row.energy(self.row, q) / self.places
+
+
+Answer = Callable[[Sequence[Array]], list[tuple[Array, Array]]]
+"""Force and tangent of every row at displacements of theirs."""
+
+
+def _light(rows: Sequence[_Row]) -> Answer:
+    return lambda qs: [row.light(q) for row, q in zip(rows, qs, strict=True)]
+
+
+def _asked(rows: Sequence[_Row]) -> Callable[[Sequence[Array]], list[RowForce]]:
+    """What rows of balls answer at displacements of theirs: sought together, from where the balls were when last asked."""
+    last: list[Rolled | None] = [None] * len(rows)
+    balls = [row.row for row in rows if isinstance(row.row, BallRow)]
+
+    def ask(qs: Sequence[Array]) -> list[RowForce]:
+        told = ball_row.respond_all(balls, qs, last)
+        last[:] = [own.rolled for own in told]
+        return told
+
+    return ask
 
 
 def loaded(spindle: Spindle, state: PairState) -> PairState:
@@ -56,8 +87,8 @@ def loaded(spindle: Spindle, state: PairState) -> PairState:
     """
     if not spindle.loaded_across:
         return state
-    chain, moved = motion(spindle, state)
-    balls = tuple(_displaced(spindle, b, _rows(chain, b.name) @ moved) for b in state.bearings)
+    chain, moved, told = _at_rest(spindle, state)
+    balls = tuple(_displaced(spindle, b, _rows(chain, b.name) @ moved, *own) for b, own in zip(state.bearings, told, strict=True))
     others = tuple(_pressed(spindle, b, _rows(chain, b.name) @ moved) for b in state.linear)
     return replace(state, bearings=balls, linear=others)
 
@@ -65,19 +96,20 @@ def loaded(spindle: Spindle, state: PairState) -> PairState:
 def motion(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array]:
     """The chain at a centred state, and the motion (n,) of its degrees of freedom under the scene's
     radial loads and weight; raises as `loaded`."""
+    return _at_rest(spindle, state)[:2]
+
+
+def _at_rest(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array, list[tuple[RowForce, int]]]:
+    """As `motion`, and what every ball row answers there, with its balls at how many places of the cage."""
     chain = rotor_base(_rings_apart(spindle), state)
-    rows = [_ball(chain, b, (b.row, 1)) for b in state.bearings] + [_roller(chain, b) for b in state.linear if isinstance(b, RollerState)]
-    own = {row.name for row in rows}
+    bearings: list[BearingState | RollerState] = [*state.bearings, *(b for b in state.linear if isinstance(b, RollerState))]
+    own, rows = {b.name for b in bearings}, [_Row(_rows(chain, b.name), b.row) for b in bearings]
     linear = matrices(replace(chain, elements=tuple(e for e in chain.elements if e.name not in own)))
     forces = [(load_carrier(spindle, load).name, load.z, np.array(load.force)) for load in spindle.radial_loads]
     forces += [(b.name, b.z, b.mass * np.array(spindle.gravity)) for b in chain.bodies if any(spindle.gravity)]
     load = sum((motion_rows(chain, body, (0.0, 0.0, z))[:2].T @ force for body, z, force in forces), start=np.zeros(len(linear.mass)))
-    size, mass = sum(float(np.hypot(*force)) for _, _, force in forces), np.diag(linear.mass)
-    moved = _motion(linear.stiffness, mass, rows, load, size)
-    balls = {b.name: ball_row.at_all_places(b.row, _rows(chain, b.name) @ moved) for b in state.bearings}
-    if all(places == 1 for _, places in balls.values()):
-        return chain, moved
-    return chain, _motion(linear.stiffness, mass, [*(_ball(chain, b, balls[b.name]) for b in state.bearings), *rows[len(state.bearings) :]], load, size)
+    balls, others = rows[: len(state.bearings)], rows[len(state.bearings) :]
+    return chain, *_motion(linear.stiffness, np.diag(linear.mass), balls, others, load, sum(float(np.hypot(*force)) for _, _, force in forces))
 
 
 def _rings_apart(spindle: Spindle) -> Spindle:
@@ -91,45 +123,21 @@ def _rings_apart(spindle: Spindle) -> Spindle:
     return replace(spindle, sets=tuple(free(s) for s in spindle.sets))
 
 
-def _ball(chain: RotorBase, b: BearingState, every: tuple[BallRow, int]) -> _Row:
-    """Of a row with its balls at so many places of the cage (`ball_row.at_all_places`)."""
-    row, places = every
-    light = replace(row, inertia=None)
-
-    def of(row: BallRow) -> Callable[[Array], tuple[Array, Array]]:
-        last: ball_row.Rolled | None = None
-
-        def answer(q: Array) -> tuple[Array, Array]:
-            nonlocal last
-            found = ball_row.respond(row, q, last)
-            last = found.rolled
-            return found.force / places, found.tangent / places
-
-        return answer
-
-    return _Row(b.name, _rows(chain, b.name), of(row), of(light), lambda q: ball_row.energy(light, q) / places)
-
-
-def _roller(chain: RotorBase, b: RollerState) -> _Row:
-    def answer(q: Array) -> tuple[Array, Array]:
-        found = roller.respond(b.row, q)
-        return found.force, found.tangent
-
-    return _Row(b.name, _rows(chain, b.name), answer, answer, lambda q: roller.energy(b.row, q))
-
-
 def _rows(chain: RotorBase, name: str) -> Array:
     return element_rows(chain, next(e for e in chain.elements if e.name == name))
 
 
-def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, size: float) -> Array:
+def _motion(
+    stiffness: Array, mass: Array, balls: Sequence[_Row], rollers: Sequence[_Row], load: Array, size: float
+) -> tuple[Array, list[tuple[RowForce, int]]]:
     """Motion (n,) under a load (n,) of `size` N: Newton's method on the balance without ball
-    inertia, or the least potential where that does not arrive, then with it.
+    inertia, or the least potential where that does not arrive, then with it; and what rows of balls answer there.
 
     With any stiffness of the rows added to K, the balance has the load and forces along the rows alone at its right:
     u lies in the span of what these do to that structure, and all is sought there, in some thirty unknowns whatever
     the number of elements (the dual of substructuring: Farhat & Roux 1991, *Int. J. Numer. Meth. Eng.* 32, 1205).
     """
+    rows = [*balls, *rollers]
     firm = stiffness + sum((row.b.T @ (np.trace(stiffness) / len(mass) * row.b) for row in rows), start=np.zeros_like(stiffness))
     held = firmly(firm, load)
     if held is None:
@@ -138,13 +146,32 @@ def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, si
     pushed = np.linalg.solve(held, np.column_stack([load, *(row.b.T for row in rows)])) / unit[:, None]
     basis = unit[:, None] * np.linalg.qr(pushed / np.maximum(np.linalg.norm(pushed, axis=0), 1e-300))[0]
     structure = _Structure(basis.T @ stiffness @ basis, basis.T @ load, tuple(row.b @ basis for row in rows), basis)
-    start = _balanced(structure, [row.light for row in rows], np.zeros(len(structure.load)))  # convex: where it arrives is the one answer
-    if start is None:
-        start = _least(structure, rows, 1e-6 * size)
-    found = _balanced(structure, [row.answer for row in rows], start)
+    found = _balanced(structure, _light(rows), np.zeros(len(structure.load)))  # convex: where it arrives is the one answer
     if found is None:
-        raise NoEquilibrium(f"the bearings find no balance under {size:.6g} N across the axis")
-    return np.asarray(basis @ found)
+        found = _least(structure, rows, 1e-6 * size)
+    where, placed = structure.rows[: len(balls)], list(balls)
+    for _ in range(2):  # as the cage stands, and at all places of the cage where these differ there
+        asked, ask = placed, _asked(placed)
+        found = _balanced(structure, partial(_heavy, asked, ask, rollers), found)
+        if found is None:
+            raise NoEquilibrium(f"the bearings find no balance under {size:.6g} N across the axis")
+        placed = [_at_all_places(row, b @ found) for row, b in zip(balls, where, strict=True)]
+        if [row.places for row in placed] == [row.places for row in asked]:
+            break
+    return np.asarray(basis @ found), [(own, row.places) for row, own in zip(asked, ask([b @ found for b in where]), strict=True)]
+
+
+def _heavy(balls: Sequence[_Row], ask: Callable[[Sequence[Array]], list[RowForce]], rollers: Sequence[_Row], qs: Sequence[Array]) -> list[tuple[Array, Array]]:
+    told = [(own.force / row.places, own.tangent / row.places) for row, own in zip(balls, ask(qs[: len(balls)]), strict=True)]
+    return told + [row.light(q) for row, q in zip(rollers, qs[len(balls) :], strict=True)]
+
+
+def _at_all_places(row: _Row, q: Array) -> _Row:
+    """The same with its balls at all places of the cage, where these differ at a displacement."""
+    if isinstance(row.row, RollerRow):
+        return row
+    every, places = ball_row.at_all_places(row.row, q)
+    return replace(row, row=every, places=places)
 
 
 @dataclass(frozen=True)
@@ -157,11 +184,11 @@ class _Structure:
     basis: Array
 
 
-def _balanced(s: _Structure, answers: Sequence[Callable[[Array], tuple[Array, Array]]], v: Array) -> Array | None:
+def _balanced(s: _Structure, answer: Answer, v: Array) -> Array | None:
     """The balance by Newton's method from v (m,); None where it does not arrive."""
-    at_rest, last = [answer(np.zeros(5))[0] for answer in answers], 0.0
+    at_rest, last = [force for force, _ in answer([np.zeros(5)] * len(s.rows))], 0.0
     for _ in range(MOST_STEPS):
-        found = [answer(b @ v) for answer, b in zip(answers, s.rows, strict=True)]
+        found = answer([b @ v for b in s.rows])
         left = s.load - s.stiffness @ v - sum((b.T @ (f - f0) for b, (f, _), f0 in zip(s.rows, found, at_rest, strict=True)), start=np.zeros_like(v))
         tangent = s.stiffness + sum((b.T @ _even(k) @ b for b, (_, k) in zip(s.rows, found, strict=True)), start=np.zeros_like(s.stiffness))
         step = displacement(tangent, left)
@@ -199,9 +226,7 @@ def _even(tangent: Array) -> Array:
     return (tangent + tangent.T) / 2
 
 
-def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
-    row, places = ball_row.at_all_places(b.row, q)
-    answer = ball_row.respond(row, q, ball_row.respond(row).rolled)
+def _displaced(spindle: Spindle, b: BearingState, q: Array, answer: RowForce, places: int) -> BearingState:
     stiffness, force = _even(answer.tangent) / places, answer.force / places
     share = answer.ball_force / max(float(answer.ball_force.sum()), 1e-300)
     most = int(np.argmax(answer.ball_force))

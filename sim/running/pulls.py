@@ -36,6 +36,7 @@ from thermospindle.model.bearing.ball_row import (
     respond,
 )
 from thermospindle.model.bearing.heavy_ball.balance import thicker
+from thermospindle.model.bearing.heavy_ball.inertia import MANY
 from thermospindle.model.bearing.roller import RollerRow, at_azimuths
 from thermospindle.model.types import Array, ComplexArray
 
@@ -123,20 +124,18 @@ def _light(fine: BallRow, q: Array) -> tuple[Array, Array]:
 def _heavy(fine: BallRow, q: Array, near: Rolled) -> tuple[Array, Array]:
     """The same of balls with inertia, which are `near` where centred rings have them, with what all of them feel of the cage's speed."""
     assert fine.inertia is not None
-    lines = [(r, z) for r, z in centre_line(fine, q).tolist()]
-    cage, found = at_one_speed(fine, lines, dict.fromkeys(lines, near.centres[0]), near.cage)
+    line = centre_line(fine, q)
+    starts = np.full(fine.balls, near.centres[0][0]), np.full(fine.balls, near.centres[1][0])
+    (cage, here, each), = at_one_speed([fine], [line], [Rolled(near.cage, starts)])
     b = kinematics(fine)
-    force, stiffness = (np.array([of(found[at][0]) for at in lines]) for of in (lambda x: x.on_outer, lambda x: np.reshape(x.stiffness(), (2, 2))))
+    force, stiffness = np.stack(here.on_outer, -1), np.stack(here.stiffness(), -1).reshape(-1, 2, 2)
     ball = replace(fine, inertia=replace(fine.inertia, cage=cage)).ball
-    thick = {at: np.array(thicker(ball, *balanced, at)).T for at, balanced in found.items()}  # (r, z, speed) by inner, outer
-    pushes = np.array([thick[at] for at in lines])
-    local = np.concatenate([stiffness, pushes[:, :2]], axis=2)
-    moved = np.einsum("jpk,jpi->jki", b, local)
+    pushes: Array = np.array(thicker(ball, here, each, tuple(line.T), MANY)).T  # (places, 3, 2): r, z and speed, by inner and outer
+    moved = np.einsum("jpk,jpi->jki", b, np.concatenate([stiffness, pushes[:, :2]], axis=2))
     if fine.inertia.cage is None:
-        each = [found[at][1] for at in lines]
-        by_itself = 1.0 - float(np.mean([d.by_cage for d in each]))
-        own = np.concatenate([np.array([d.by_line for d in each]), pushes[:, 2]], axis=1) / by_itself
-        all_feel = np.mean(np.einsum("jpk,jp->jk", b, np.array([d.force_by_cage for d in each])), axis=0)
+        by_itself = 1.0 - float(np.mean(each.by_cage))
+        own = np.concatenate([np.stack(each.by_line, -1), pushes[:, 2]], axis=1) / by_itself
+        all_feel = np.mean(np.einsum("jpk,jp->jk", b, np.stack(each.force_by_cage, -1)), axis=0)
         moved = moved + all_feel[:, None] * own[:, None, :]
     return force, moved
 

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centre_line, respond
+from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centre_line, respond, respond_all
 from thermospindle.model.bearing.centred import centred_axial_force
 from thermospindle.model.bearing.heavy_ball.balance import HeavyBall, balance, settled
+from thermospindle.model.bearing.heavy_ball.together import of_each, settled_together
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
@@ -107,7 +108,7 @@ def test_stiffness_is_the_derivative_of_the_force_of_a_settled_ball():
 def test_centred_rows_are_one_ball_many_times(monkeypatch):
     """Equal balls are settled once, answer alike, and the short way to the axial force gives that of `respond`."""
     row = BallRow(12, 1.0e-3, 0.86e-3, 0.6e-3, 0.7e-3, 8e9, 9e9, 60e-3, BALL.inertia)
-    calls = []
+    calls = []  # of one ball
     monkeypatch.setattr("thermospindle.model.bearing.ball_row.settled", lambda *given: calls.append(given) or settled(*given))
     for movement in (-5e-6, 0.0, 8e-6):
         calls.clear()
@@ -120,8 +121,8 @@ def test_centred_rows_are_one_ball_many_times(monkeypatch):
             respond(replace(without, axial=row.axial + movement)).force[2], rel=1e-12
         )
     calls.clear()
-    respond(row, np.array([1e-6, 0, 0, 0, 0]))
-    assert len(calls) > 6
+    assert np.ptp(respond(row, np.array([1e-6, 0, 0, 0, 0])).ball_force) > 0  # no longer alike
+    assert not calls
 
 
 def test_a_ball_that_does_not_settle_says_so():
@@ -211,3 +212,32 @@ def test_a_ball_settles_however_loose_it_is_between_rings_that_turn_against_each
         here = settled(ball, line, 1e-9 * (rpm / 20_000) ** 2, 1e-2)
         assert here.inner > 0
         assert np.linalg.eigvals(np.reshape(np.add(here.by_inner, here.by_line), (2, 2))).real.min() > 0  # pushed aside, it comes back
+
+
+@pytest.mark.parametrize("ball", [BALL, replace(AGAINST, inertia=replace(AGAINST.inertia, cage=-330.0)).ball], ids=["one-turns", "against-each-other"])
+@pytest.mark.parametrize("near", [False, True])
+def test_balls_sought_together_are_those_sought_one_by_one(ball, near):
+    """From play to 20 um pressed, some from where others are: also what no step from there reaches."""
+    lengths = ball.inner_length + ball.outer_length + np.linspace(-25e-6, 20e-6, 31)
+    line = -lengths * np.cos(0.6), lengths * np.sin(0.6)
+    tolerance, least = np.full(31, 1e-9), np.full(31, 1e-2)
+    alone = [settled(ball, at, 1e-9, 1e-2) for at in zip(*line, strict=True)]
+    start = tuple(np.roll([b.centre[i] for b in alone], 7) for i in (0, 1)) if near else None
+    together = settled_together(of_each([ball], [31]), line, tolerance, least, start)
+    for name in ("centre", "on_outer", "inner", "outer", "inner_angle", "outer_angle", "deformation"):
+        told = np.array([getattr(b, name) for b in alone]).T
+        assert getattr(together, name) == pytest.approx(told, rel=1e-7, abs=1e-7 * np.abs(told).max()), name
+    assert np.hypot(*together.resultant).max() < 1e-9
+
+
+def test_rows_sought_together_are_those_sought_alone():
+    """Each at the speed of its own cage: heavy balls of two kinds, a row whose cage is held, one without inertia, and centred rings."""
+    row = BallRow(12, 1.0e-3, 0.86e-3, 0.6e-3, 0.7e-3, 8e9, 9e9, 60e-3, BALL.inertia)
+    rows = [row, replace(row, balls=17, inertia=DISK_BALL), replace(row, inertia=replace(BALL.inertia, cage=400.0)), replace(row, inertia=None), row]
+    aside = [np.array([3e-6, -2e-6, 1e-6, 2e-5, 1e-5]) * (k < 4) for k in range(5)]
+    together = respond_all(rows, aside, [None, respond(rows[1]).rolled, None, None, None])
+    assert together[0].rolled.cage != together[1].rolled.cage
+    for found, own, q in zip(together, rows, aside, strict=True):
+        alone = respond(own, q)
+        assert found.force == pytest.approx(alone.force, rel=1e-9, abs=1e-9 * np.abs(alone.force).max())
+        assert found.tangent == pytest.approx(alone.tangent, rel=1e-8, abs=1e-8 * np.abs(alone.tangent).max())

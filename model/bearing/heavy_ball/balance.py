@@ -17,19 +17,20 @@ forces of a row whose rings are moved aside would add up to a force that only on
 With M the friction is no derivative of an energy, so k, the exact derivative of P, is not symmetric: for a row of the reference spindle the
 radial-tilt entries differ by 7e-9 of their size at 7200 rpm, 7e-5 at 30,000, as the fourth power of the speed.
 
-Plain numbers: a ball takes a few steps of a few operations, less than one call of an array library.
+Plain numbers of one ball, which takes a few steps of a few operations, less than one call of an array library; the same formulas of many
+balls at once, each on a line of its own, with arrays (balls,) in their place (`together`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, hypot, sqrt
+from math import hypot, sqrt
 from typing import NamedTuple
 
-from thermospindle.model.bearing.heavy_ball.inertia import BallInertia, Vector, rolling
+from thermospindle.model.bearing.heavy_ball.inertia import PLAIN, BallInertia, Functions, Number, Vector, rolling
 from thermospindle.model.errors import NoEquilibrium
 
-Matrix = tuple[float, float, float, float]
+Matrix = tuple[Number, Number, Number, Number]
 """(rr, rz, zr, zz)."""
 
 STEPS, FEW = 100, 6  # from where a ball may be, and from where it was
@@ -55,11 +56,11 @@ class Balance(NamedTuple):
     centre: Vector
     resultant: Vector
     on_outer: Vector
-    inner: float
-    outer: float
-    inner_angle: float
-    outer_angle: float
-    deformation: float
+    inner: Number
+    outer: Number
+    inner_angle: Number
+    outer_angle: Number
+    deformation: Number
     by_inner: Matrix
     by_outer: Matrix
     by_line: Matrix
@@ -73,7 +74,7 @@ class Balance(NamedTuple):
     def stiffness(self) -> Matrix:
         """J (S + G)^-1 S + H (S + G)^-1 G: what the outer ring sees of the ball, whose centre follows it."""
         s, g = self.by_inner, self.by_line
-        inverse = _inverse((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
+        inverse = inverted((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
         own, passed = _product(self.by_outer, _product(inverse, s)), _product(self.passed_on, _product(inverse, g))
         return own[0] + passed[0], own[1] + passed[1], own[2] + passed[2], own[3] + passed[3]
 
@@ -88,7 +89,7 @@ def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float, start
     """
     here = None if start is None else _approached(ball, line, tolerance, least, start, FEW)
     if here is None or here.off >= tolerance:
-        here = _approached(ball, line, tolerance, least, _start(ball, line), STEPS)
+        here = _approached(ball, line, tolerance, least, start_of(ball, line), STEPS)
     if here.off >= tolerance:
         stuck, here = here, _drifted(ball, line, tolerance, least)
         if here.off >= tolerance:
@@ -106,7 +107,7 @@ def _approached(ball: HeavyBall, line: Vector, tolerance: float, least: float, s
         if off < tolerance:
             return here
         s, g = here.by_inner, here.by_line
-        inverse = _inverse((s[0] + g[0] + least, s[1] + g[1], s[2] + g[2], s[3] + g[3] + least))
+        inverse = inverted((s[0] + g[0] + least, s[1] + g[1], s[2] + g[2], s[3] + g[3] + least))
         step_r = inverse[0] * here.resultant[0] + inverse[1] * here.resultant[1]
         step_z = inverse[2] * here.resultant[0] + inverse[3] * here.resultant[1]
         factor = min(1.0, longest / max(hypot(step_r, step_z), 1e-30))
@@ -125,13 +126,13 @@ def _drifted(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> B
     pseudo-transient continuation (Kelley and Keyes 1998).
 
     Rings that turn against each other leave a ball little centrifugal force and much moment. Where the friction 2 M / D across the
-    outer race is more than the centrifugal force has across it, it carries a loose ball from the crossing of `_start` over to the other
+    outer race is more than the centrifugal force has across it, it carries a loose ball from the crossing of `start_of` over to the other
     one, where the drift begins, and a lightly pressed ball as far. On the way S + G is not positive, and halved steps end where it is
     singular and the resultant least, but not nothing. A drift may pass through a larger one. Each step is implicit, against a drag that
     lets the resultant carry the ball `LONGEST` at most and is twice what S + G falls short of nothing; it is Newton's at the end.
     """
     longest = LONGEST * hypot(*line)
-    here = balance(ball, _other_side(_start(ball, line), line), line)
+    here = balance(ball, _other_side(start_of(ball, line), line), line)
     for _ in range(STEPS):
         if here.off < tolerance:
             break
@@ -139,13 +140,13 @@ def _drifted(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> B
         rr, rz, zr, zz = s_rr + g_rr, s_rz + g_rz, s_zr + g_zr, s_zz + g_zz
         softest = (rr + zz) / 2 - sqrt(max((rr - zz) ** 2 / 4 + rz * zr, 0.0))
         drag = least + here.off / longest + 2 * max(-softest, 0.0)
-        step_r, step_z = _times(_inverse((rr + drag, rz, zr, zz + drag)), here.resultant)
+        step_r, step_z = times(inverted((rr + drag, rz, zr, zz + drag)), here.resultant)
         factor = min(1.0, longest / max(hypot(step_r, step_z), 1e-30))
         here = balance(ball, (here.centre[0] + factor * step_r, here.centre[1] + factor * step_z), line)
     return here
 
 
-def _start(ball: HeavyBall, line: Vector) -> Vector:
+def start_of(ball: HeavyBall, line: Vector) -> Vector:
     """Where the centre of a ball may be: between two races that press it; flung outward between two that do not.
 
     Then its centre lies where two circles meet, about the groove centres, each as far as its race
@@ -177,15 +178,15 @@ def _other_side(centre: Vector, line: Vector) -> Vector:
     return twice * line[0] - centre[0], twice * line[1] - centre[1]
 
 
-def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
+def balance(ball: HeavyBall, centre: Vector, line: Vector, of: Functions = PLAIN) -> Balance:
     """Forces on a ball with its centre at `centre` (m), and their derivatives."""
-    inner_length, (ir, iz), inner, inner_along = _contact(centre, ball.inner_length, ball.inner_constant)
+    inner_length, (ir, iz), inner, inner_along = _contact(centre, ball.inner_length, ball.inner_constant, of)
     gap = (line[0] - centre[0], line[1] - centre[1])
-    outer_length, (er, ez), outer, outer_along = _contact(gap, ball.outer_length, ball.outer_constant)
+    outer_length, (er, ez), outer, outer_along = _contact(gap, ball.outer_length, ball.outer_constant, of)
     cosine, sine = -er, ez
-    loads = ball.inertia.loads((cosine, sine), (-ir, iz))
+    loads = ball.inertia.loads((cosine, sine), (-ir, iz), of)
     # outer-race control: the friction that turns the ball's angular momentum acts at the outer contact, 2 M / D across it
-    grip = 2 / ball.inertia.diameter if outer > 0 else 0.0
+    grip = 2 / ball.inertia.diameter * (outer > 0)
     friction, by_outer_angle, by_inner_angle = grip * loads.moment, grip * loads.moment_by_outer, grip * loads.moment_by_inner
     on_outer = (outer * er - friction * sine, outer * ez - friction * cosine)
     # across (sine, cosine) turns into (cosine, -sine) with the angle, which turns by across / length for a movement of the line
@@ -204,8 +205,8 @@ def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
         on_outer,
         inner,
         outer,
-        atan2(abs(iz), -ir),
-        atan2(abs(ez), -er),
+        of.atan2(abs(iz), -ir),
+        of.atan2(abs(ez), -er),
         inner_length - ball.inner_length + outer_length - ball.outer_length,
         (held[0] - passed_on[0] - flung_r, held[1] - passed_on[1] - flung_z, held[2] - passed_on[2], held[3] - passed_on[3]),
         by_outer,
@@ -219,26 +220,26 @@ class Driven(NamedTuple):
     by the outer groove's centre (2,) and by the cage's speed, of the force on the outer ring (2,) by the cage's speed, and
     of its own speed by its centre (2,) while both grooves stand."""
 
-    speed: float
+    speed: Number
     by_line: Vector
-    by_cage: float
+    by_cage: Number
     force_by_cage: Vector
     by_centre: Vector
 
 
-def driven(ball: HeavyBall, here: Balance, line: Vector) -> Driven:
+def driven(ball: HeavyBall, here: Balance, line: Vector, of: Functions = PLAIN) -> Driven:
     """Of a ball settled at `here` with its cage's speed, for the outer groove's centre at `line`; its centre follows both."""
     (cr, cz), gap = here.centre, (line[0] - here.centre[0], line[1] - here.centre[1])
-    inner_length, outer_length = hypot(cr, cz), hypot(*gap)
+    inner_length, outer_length = of.hypot(cr, cz), of.hypot(*gap)
     (ir, iz), cosine, sine = (cr / inner_length, cz / inner_length), -gap[0] / outer_length, gap[1] / outer_length
-    own, loads = rolling(ball.inertia, here.centre, line), ball.inertia.loads((cosine, sine), (-ir, iz))
-    friction = (2 / ball.inertia.diameter if here.outer > 0 else 0.0) * loads.moment_by_speed
+    own, loads = rolling(ball.inertia, here.centre, line, of), ball.inertia.loads((cosine, sine), (-ir, iz), of)
+    friction = 2 / ball.inertia.diameter * (here.outer > 0) * loads.moment_by_speed
     on_outer = -friction * sine, -friction * cosine
     s, g, j = here.by_inner, here.by_line, here.by_outer
-    inverse = _inverse((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
-    moved_r, moved_z = _times(inverse, (on_outer[0] + loads.centrifugal_by_speed, on_outer[1]))  # of the centre, by the cage's speed
+    inverse = inverted((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
+    moved_r, moved_z = times(inverse, (on_outer[0] + loads.centrifugal_by_speed, on_outer[1]))  # of the centre, by the cage's speed
     follows = _product(inverse, g)  # and by the line
-    pushed_r, pushed_z = _times(j, (moved_r, moved_z))
+    pushed_r, pushed_z = times(j, (moved_r, moved_z))
     by_gap = own.by_outer * sine / outer_length, own.by_outer * cosine / outer_length
     by_centre = own.by_inner * iz / inner_length - by_gap[0], -own.by_inner * ir / inner_length - by_gap[1]
     return Driven(
@@ -250,46 +251,46 @@ def driven(ball: HeavyBall, here: Balance, line: Vector) -> Driven:
     )
 
 
-def thicker(ball: HeavyBall, here: Balance, rolls: Driven, line: Vector) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def thicker(ball: HeavyBall, here: Balance, rolls: Driven, line: Vector, of: Functions = PLAIN) -> tuple[tuple[Number, Number, Number], tuple[Number, Number, Number]]:
     """What a ball, settled as in `driven`, does that is thicker at its inner, and at its outer contact, while its cage keeps its speed: derivatives
     of the force on the outer ring, r and z (N/m), and of its own speed by rolling (rad/s m). The contact that is pressed
     pushes the ball, whose centre gives way by (S + G)^-1 of that."""
     s, g, (cr, cz), gap = here.by_inner, here.by_line, here.centre, (line[0] - here.centre[0], line[1] - here.centre[1])
-    inverse = _inverse((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
-    inner = -1.5 * ball.inner_constant ** (2 / 3) * here.inner ** (1 / 3) / hypot(cr, cz)
-    outer = 1.5 * ball.outer_constant ** (2 / 3) * here.outer ** (1 / 3) / hypot(*gap)
+    inverse = inverted((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
+    inner = -1.5 * ball.inner_constant ** (2 / 3) * here.inner ** (1 / 3) / of.hypot(cr, cz)
+    outer = 1.5 * ball.outer_constant ** (2 / 3) * here.outer ** (1 / 3) / of.hypot(*gap)
     towards = outer * gap[0], outer * gap[1]
     found = []
     for push, direct in (((inner * cr, inner * cz), (0.0, 0.0)), (towards, towards)):
-        moved = _times(inverse, push)
-        held = _times(here.by_outer, moved)
+        moved = times(inverse, push)
+        held = times(here.by_outer, moved)
         found.append((direct[0] - held[0], direct[1] - held[1], rolls.by_centre[0] * moved[0] + rolls.by_centre[1] * moved[1]))
     return found[0], found[1]
 
 
-def _contact(vector: Vector, unloaded: float, constant: float) -> tuple[float, Vector, float, float]:
+def _contact(vector: Vector, unloaded: float, constant: float, of: Functions) -> tuple[Number, Vector, Number, Number]:
     """Length (m) and direction of a line between centres, contact force K d^1.5 (N) and its slope (N/m)."""
-    length = hypot(*vector)
-    pressed = max(length - unloaded, 0.0)
-    root = constant * sqrt(pressed)
+    length = of.hypot(*vector)
+    pressed = of.larger(length - unloaded, 0.0)
+    root = constant * of.sqrt(pressed)
     return length, (vector[0] / length, vector[1] / length), root * pressed, 1.5 * root
 
 
-def spring(e: Vector, along: float, across: float) -> Matrix:
+def spring(e: Vector, along: Number, across: Number) -> Matrix:
     """along e e^T + across (1 - e e^T)."""
     rr, rz, zz = e[0] * e[0], e[0] * e[1], e[1] * e[1]
     more = along - across
     return across + more * rr, more * rz, more * rz, across + more * zz
 
 
-def _inverse(m: Matrix) -> Matrix:
+def inverted(m: Matrix) -> Matrix:
     determinant = m[0] * m[3] - m[1] * m[2]
-    if determinant == 0.0:
+    if not (determinant if isinstance(determinant, float) else determinant.all()):
         raise NoEquilibrium("a ball touches neither race and nothing holds it")
     return m[3] / determinant, -m[1] / determinant, -m[2] / determinant, m[0] / determinant
 
 
-def _times(m: Matrix, v: Vector) -> Vector:
+def times(m: Matrix, v: Vector) -> Vector:
     return m[0] * v[0] + m[1] * v[1], m[2] * v[0] + m[3] * v[1]
 
 
