@@ -37,6 +37,7 @@ IDLE = 300.0
 ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",  # the cores are taken by the workers; as the command line has it, so that sums round alike
     "PYTHONSAFEPATH": "1",  # a worker is a `python -m`, which would import from the folder one happens to stand in
+    "LOKY_MAX_MEMORY_LEAK_SIZE": "1e9",  # bytes that a worker may grow by until another takes its place: what is kept of a campaign's model takes 0.3e9
 }
 
 _last: tuple[int, float] = (0, 0.0)  # how many workers were last at work, until when

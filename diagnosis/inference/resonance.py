@@ -39,9 +39,6 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     if len(model.resonances) >= RESONANCES + moves:
         return None
     resonance = _left_by(model, h, moves)
-    if resonance is not None and h.mechanisms:  # what fitting on would explain is no resonance
-        h = settled(model, h)
-        resonance = _left_by(model, h)
     if resonance is None:
         return None
     hidden, n = h.evidence.learned.errors <= STRAIN, len(model.parameters)
@@ -70,6 +67,15 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     except FAILED:
         return None
     return (wider, found) if asked(found, PLENTY, clear) and not found.evidence.rounded else None
+
+
+def beside(model: CampaignModel, h: Hypothesis, workers: int | None = None) -> tuple[CampaignModel, Hypothesis]:
+    """The model with the light resonance that an explanation leaves, and the explanation in it, as `with_resonance`; or both as
+    they are. It is settled before that is told where there seems to be one, for what fitting on would explain is no resonance."""
+    if not h.mechanisms or len(model.resonances) >= RESONANCES or _left_by(model, h) is None:
+        return model, h
+    h = settled(model, h)
+    return with_resonance(model, h, workers) or (model, h.light)
 
 
 def _centred(resonance: Resonance, fitted: Array, moves: bool) -> tuple[Resonance, Array]:

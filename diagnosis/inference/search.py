@@ -14,9 +14,9 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, settled, widened
-from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, without_one
+from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, rivals_beside, without_one
 from thermospindle.diagnosis.inference.problem import Problem
-from thermospindle.diagnosis.inference.resonance import with_resonance
+from thermospindle.diagnosis.inference.resonance import beside, with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import (
     BEHIND,
@@ -71,18 +71,17 @@ def search(
             model = hit
             none = _without_effects(model)
         plain = none
-        wider = with_resonance(model, none, workers)
-        model, none = wider or (model, none)
+        model, none = with_resonance(model, none, workers) or (model, none)
         every = [*named, *own_laws(), *free]
     progress("fitted without effects")
     tried = fit_singles(model, none, every, progress, workers)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
-    with meanwhile(partial(with_resonance, model, best, workers) if best.mechanisms else _nothing, workers) as wider_of:
-        own = by_own_laws(model, none, tried, every, workers)
-        wider = wider_of()
+    with meanwhile(partial(beside, model, best, workers), workers) as told:
+        together = _together(model, none, tried, every, workers)  # as they are where the model stays as it is
+        wider, best_settled = told()
     before = model
-    if wider is not None:
-        model = wider[0]
+    if len(wider.resonances) > len(model.resonances):
+        model = wider
         none = _without_effects(model)
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
             tried = fit_singles(model, none, every, lambda done: None, workers)  # steps that were counted already
@@ -93,13 +92,12 @@ def search(
         if moves is not None and moves[1].evidence.ln > best.evidence.ln + PLENTY:
             model, none = moves
             tried = fit_singles(model, none, every, lambda done: None, workers)
-    own = own if model is before else by_own_laws(model, none, tried, every, workers)
-    tried = replace(tried, singles=better([*tried.singles, *own]))
-    singles = tried.singles
-    pairs = joined(model, none, singles, every, tried.most, tried.expected, workers)
+    tried, pairs = together if model is before else _together(model, none, tried, every, workers)
+    singles = better([*tried.singles, best_settled.of(best.mechanisms)]) if model is before and best.mechanisms else tried.singles
     pairs = better([*pairs, *joined_early(model, none, tried, pairs, every, workers)])
     found = better([*singles, *pairs, *without_one(model, [*singles, *pairs], tried.most, tried.expected, workers)])
     found = better([*found, *exchanged(model, found, tried, workers)])
+    found = better([*found, *rivals_beside(model, found, tried, workers)])
     progress("pairs fitted")
     finalists = _finalists(found)
     none, *ended = _ended(model, max((h.evidence.ln for h in found), default=-np.inf), [none, *finalists], workers)
@@ -114,8 +112,10 @@ def search(
     return Search(model, none, hypotheses, tried.screened, _alike(model, none.fit.nuisance, hypotheses), none.evidence.ln - plain.evidence.ln)
 
 
-def _nothing() -> None:
-    return None
+def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Sequence[Mechanism], workers: int | None) -> tuple[Singles, list[Hypothesis]]:
+    """Single mechanisms, with laws of the data's own too, and those that are joined to the best."""
+    tried = replace(tried, singles=better([*tried.singles, *by_own_laws(model, none, tried, every, workers)]))
+    return tried, joined(model, none, tried.singles, every, tried.most, tried.expected, workers)
 
 
 def _without_effects(model: CampaignModel) -> Hypothesis:
@@ -142,7 +142,7 @@ def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Se
 def _ended(model: CampaignModel, best: float, found: Sequence[Hypothesis], workers: int | None) -> list[Hypothesis]:
     """Each fitted anew, with the very mechanisms that it has here, beside the `best` ln evidence so far."""
     ended = in_parallel(partial(_at_the_end, model, best), [h.light for h in found], workers)
-    return [replace(e, fit=replace(e.fit, mechanisms=h.mechanisms)) for e, h in zip(ended, found, strict=True)]
+    return [e.of(h.mechanisms) for e, h in zip(ended, found, strict=True)]
 
 
 def _at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:

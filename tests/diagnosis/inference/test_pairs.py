@@ -12,7 +12,7 @@ from thermospindle.diagnosis.inference import pairs
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
-from thermospindle.diagnosis.inference.pairs import exchanged, joined, joined_early, without_one
+from thermospindle.diagnosis.inference.pairs import exchanged, joined, joined_early, rivals_beside, without_one
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import Singles, fit_singles
@@ -129,3 +129,25 @@ def test_two_effects_without_laws_are_exchanged_for_others(spindle):
     assert more["bond_softening", "preload_loss"] > max(pair.evidence.ln, more["modulus_softening", "preload_loss"])
     lawful = replace(pair, evidence=replace(pair.evidence, learned=replace(pair.evidence.learned, departures=(1.0, 0.1))))
     assert exchanged(model, [lawful], tried, 1) == []
+
+
+@pytest.mark.parametrize(("behind", "tried_too", "asked"), [(17.0, False, True), (45.0, False, False), (17.0, True, False)])
+def test_a_rival_of_the_first_gets_the_second_too(spindle, behind, tried_too, asked):
+    """A bond that softens and a weaker preload, of which a modulus that softens leads with the preload, by 40 over itself alone: the bond,
+    which alone is 17 behind it, is fitted with the preload. Not where it is farther behind than the preload gains, or has been."""
+    bond, preload, modulus = (variants(effect(name))[0] for name in ("bond_softening", "preload_loss", "modulus_softening"))
+    hidden = [(m.effect, m.values(m.size.typical, [q.neutral for q in m.shape])) for m in (bond, preload)]
+    model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, hidden))
+
+    def told(mechanisms, ln):
+        found = fit(model, mechanisms, tempers=TEMPERS[-2:])
+        return Hypothesis(found, replace(evidence(model, found), ln=ln))
+
+    pair, first, rival = told((modulus, preload), 0.0), told((modulus,), -40.0), told((bond,), -40.0 - behind)
+    known = [told((bond, preload), 1.0 - 40.0)] if tried_too else []
+    tried = Singles([first, rival], (), np.inf, steady(pair.evidence.learned))
+    more = rivals_beside(model, [pair, first, rival, *known], tried, 1)
+    assert [h.names for h in more] == ([("bond_softening", "preload_loss")] if asked else [])
+    if asked:
+        assert more[0].evidence.ln > evidence(model, pair.fit).ln
+        assert more[0].fit.sizes[1] != pytest.approx(preload.size.neutral)

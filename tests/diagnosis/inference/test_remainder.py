@@ -17,7 +17,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.remainder import by_frequency, light_resonance
-from thermospindle.diagnosis.inference.resonance import _centred, _resonates, moving, shown, with_resonance
+from thermospindle.diagnosis.inference.resonance import _centred, _resonates, beside, moving, shown, with_resonance
 from thermospindle.diagnosis.parameters.nuisance import RESONANCE, STIFFNESS_DRIFT, Resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import NoEquilibrium
@@ -258,6 +258,7 @@ def test_what_fitting_on_would_explain_is_no_resonance(monkeypatch, settles):
     monkeypatch.setattr(f"{module}.settled", lambda model, h: late)
     monkeypatch.setattr(f"{module}.in_parallel", fitted)
     model = SimpleNamespace(resonances=(), thinned=None, parameters=(), with_resonance=lambda resonance: None)
-    assert with_resonance(model, early) is None
+    late.light = late
+    assert beside(model, early) == (model, late)
     assert looked == [early.fit, late.fit]
     assert bool(fits) != settles
