@@ -19,3 +19,8 @@ TO_MM, TO_UM, TO_NM = 1e3, 1e6, 1e9
 def in_rpm(speed: float) -> float:
     """A speed (rad/s) in rpm as it was given: to 12 significant digits, for 24000 rpm to rad/s and back is 24000.000000000004."""
     return float(f"{speed / RPM:.12g}")
+
+
+def in_nm(length: float) -> str:
+    """A small length (m) with its unit, to three digits: nm, or um from 1000 nm on."""
+    return f"{TO_NM * length:.3g} nm" if abs(TO_NM * length) < 999.5 else f"{TO_UM * length:.3g} um"

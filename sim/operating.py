@@ -245,11 +245,15 @@ def stiffness_table(spindle: Spindle, temperatures: Sequence[float], speeds: Seq
 
 
 def unloads(spindle: Spindle, points: Sequence[OperatingPoint], bearing: str) -> float | None:
-    """Temperature (C) between two neighbouring points at which a bearing loses contact, to a millikelvin."""
+    """Temperature (C) between two neighbouring points, the first such two, at which a bearing loses contact, or gets it in the
+    warmth, to a millikelvin; the lowest of the points where it has none at any of them."""
 
     def deformation(temperature: float) -> float:
         condition = Condition(temperature, points[0].condition.speed)
-        state = operating_point(spindle, condition).state.bearing(bearing)
+        try:
+            state = operating_point(spindle, condition).state.bearing(bearing)
+        except NoEquilibrium:  # between rows that are let go nothing holds the rings
+            return -1e-12
         return state.deformation if state.in_contact else min(state.deformation, -1e-12)
 
     for cold, hot in pairwise(points):

@@ -124,11 +124,12 @@ def warm_up(
         raise BadInput(f"{spindle.file or spindle.name}: thermal.convection: cools no face, so the spindle would heat up without end")
     machine = _Machine(spindle, speed, effects, reading(model))
     reached: list[Reached] = []  # at first and last
+    course: dict[float, Mapping[str, float]] = {}  # loads of friction (N) at every time
 
     def drive(time: float, nodal: Array) -> heat.Running:
         state = machine.point(nodal).state
         loads = friction.loads(spindle, state)
-        reached[1:] = [Reached(time, nodal, loads, state)]
+        reached[1:], course[time] = [Reached(time, nodal, loads, state)], loads
         return heat.Running(air, speed, loads)
 
     told = 0
@@ -141,6 +142,7 @@ def warm_up(
 
     def marched(whole: float) -> heat.History:
         reached.clear()
+        course.clear()
         drive(0.0, model.nodal(start))
         try:
             end = duration or whole
@@ -148,7 +150,7 @@ def warm_up(
         except (OutsideRange, heat.NotSettled) as error:
             shorter = 0.9 * reached[-1].time / MINUTE
             until = f"; the way there is computed all the same: --minutes {shorter:.2g}" if shorter * MINUTE > SHORTEST else ""
-            raise type(error)(f"{where} {_ran_away(machine, reached, str(error))}{until}") from None
+            raise type(error)(f"{where} {_ran_away(machine, reached, course, error)}{until}") from None
 
     where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
 
@@ -175,7 +177,7 @@ def warm_up(
             else:
                 history = marched(TIME_CONSTANTS * constant)
                 if duration is not None:
-                    return answered(history, None, constant, unsteady=why)
+                    return answered(history, None, constant, unsteady=why if loads else f"on the way to it {why}")
         raise type(error)(f"{where} {why}; {_remedy(spindle)}") from None
     final = model.nodal(field)
     constant = heat.slowest(model, field, drive(0.0, final))
@@ -195,24 +197,32 @@ class Reached:
     state: PairState
 
 
-def _ran_away(machine: _Machine, reached: Sequence[Reached], error: str) -> str:
-    """How far a warm-up came that left a law: the bearing whose load of friction has grown most
-    since the start, or the hottest where none has, and what helps."""
+def _ran_away(machine: _Machine, reached: Sequence[Reached], course: Mapping[float, Mapping[str, float]], error: Exception) -> str:
+    """How far a warm-up came that left a law: the bearing whose load of friction has grown most since
+    the start, and ever faster, or the hottest where none has, and what helps."""
     begin, last = reached[0], reached[-1]
     after, regions = f"after {last.time / MINUTE:.3g} min", machine.read.region_means(last.nodal)
     temperatures = machine.read.model.bearing @ last.nodal
     ringed = machine.read.model.spindle.ringed
     grown = {b.name: abs(last.loads[b.name]) / max(abs(begin.loads[b.name]), 1e-9) for b in ringed}
     most = max(ringed, key=lambda b: grown[b.name])
-    if grown[most.name] <= heat.GROWN:
+    if grown[most.name] <= heat.GROWN or not (isinstance(error, heat.NotSettled | heat.RanAway) or _ever_faster(course, most.name)):
         hottest = ringed[int(np.argmax(temperatures))].name
-        return f"the bearings leave the range of a law {after}, {hottest} at {temperatures.max():.0f} C: {error}; {_remedy(machine.spindle, hottest)}"
+        helps = f"what helps is a law that is told as far, or {_remedy(machine.spindle, hottest).removeprefix('what helps is ')}"
+        return f"the bearings leave the range of a law {after}, {hottest} at {temperatures.max():.0f} C: {error}; {helps}"
     inner, outer = regions[most.inner_ring], regions[most.outer_ring]
     return (
         f"the bearings run away {after}: {most.name} has Palmgren's load of friction P1 = {last.loads[most.name]:.0f} N, {_times(grown[most.name], begin.loads[most.name])} at the start"
         f"{_axially(begin.state, last.state, most.name)}, with its inner ring at {inner:.0f} C and its outer one at {outer:.0f} C{_taken_up(last.state, most.name) if inner > outer else ''}; "
         f"the load heats it further ({error}); {_remedy(machine.spindle, most.name)}"
     )
+
+
+def _ever_faster(course: Mapping[float, Mapping[str, float]], name: str) -> bool:
+    """Whether a load of friction grew by more in the last third of the time than in the one before."""
+    times = sorted(course)
+    early, late, end = np.interp(np.array([1, 2, 3]) / 3 * times[-1], times, [abs(course[t][name]) for t in times])
+    return bool(end - late > max(late - early, 0.0))
 
 
 def _times(grown: float, load: float) -> str:

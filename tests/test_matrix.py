@@ -144,7 +144,7 @@ LONG = {
     "warmup": ["--speed", 3600, "--minutes", 2],
 }
 KEYS = {
-    "table": {"temperature_C", "bearings", "unloads_C", "speeds", "provenance"},
+    "table": {"temperature_C", "bearings", "unloads_C", "loose", "speeds", "provenance"},
     "modes": {"temperature_C", "speed_rpm", "status", "modes"},
     "runout": {"temperature_C", "speed_rpm", "status", "seconds", "rro_um", "nrro_um", "lines", "probes", "provenance"},
     "map": {"nominal", "sentences", "coincidences", "modes", "lines", "grid", "nrro_um", "provenance"},

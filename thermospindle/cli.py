@@ -86,6 +86,8 @@ def _run(arguments: list[str]) -> int:
         if told := _not_writable(error, asked):
             raise BadInput(told) from None
         raise
+    except OutsideRange as error:  # a law or table, which tells its key, of the scene asked for
+        raise OutsideRange(_with_file(str(error), asked.get("scene"))) from None
     finally:
         COMMAND.reset(token)
     for doubt in answer.values["warnings"]:
@@ -98,6 +100,14 @@ def _run(arguments: list[str]) -> int:
         sys.stdout.flush()
     answer.then()
     return 0
+
+
+def _with_file(told: str, scene: object) -> str:
+    """A sentence about a scene with its file before it, where that is not told yet."""
+    if not isinstance(scene, str | Path):
+        return told
+    file = str(import_module("thermospindle.model.scene.reading").scene_path(scene))
+    return told if file in told else f"{file}: {told}"
 
 
 @contextmanager

@@ -70,7 +70,8 @@ STEPS = 5  # of temperature over a scene's range, where none are told
 class StiffnessTable:
     """Bearing properties on a grid: `values[bearing][column]` has shape (temperatures, speeds), in the column's unit.
 
-    `unloads` says at which temperature (C) a bearing first loses contact on the grid, None where it never does.
+    `unloads` says at which temperature (C) a bearing loses contact on the grid at its lowest speed, None where it never
+    does; `loose` on which side of that it has none.
     `provenance` is what the table was made from: scene, its hash, program versions.
     """
 
@@ -79,6 +80,14 @@ class StiffnessTable:
     values: Mapping[str, Mapping[str, Array]]
     unloads: Mapping[str, float | None]
     provenance: Mapping[str, str]
+
+    def loose(self, bearing: str) -> str:
+        """Where a bearing has no contact at the lowest speed: `above` the temperature at which it `unloads`, `below`
+        it, or `throughout` the grid, whose lowest temperature that is then; empty where it has contact everywhere."""
+        if self.unloads.get(bearing) is None:
+            return ""
+        contact = self.values[bearing]["contact_force_N"][:, 0] > 0
+        return "above" if contact[0] else "below" if contact.any() else "throughout"
 
     def at(self, bearing: str, column: str, temperature: float, speed: float = 0.0) -> float:
         """Property at a condition, shape-preserving cubic (PCHIP) between the grid's conditions.

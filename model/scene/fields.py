@@ -170,7 +170,7 @@ def read_toml(file: Path) -> dict[str, Any]:
     except RecursionError:
         raise BadInput(f"{file}: its tables are nested too deep to be read") from None
     except ValueError as error:  # of TOML, of UTF-8, of numbers with thousands of digits
-        raise BadInput(f"{file}: not a TOML file: {error}{_by_comma(text, str(error))}") from None
+        raise BadInput(f"{file}: not a TOML file: {error}{_by_comma(text, str(error))}{_twice(text, str(error))}") from None
     if not tables:
         raise BadInput(f"{file}: has no keys: it is empty, or all of it is comment")
     return tables
@@ -183,6 +183,12 @@ def _by_comma(text: str, error: str) -> str:
     line, column = (int(number) - 1 for number in told.groups())
     written = next((w for w in re.finditer(r"[-+]?\d+,\d+", text.split("\n")[line]) if w.start() <= column <= w.end()), None)
     return f": {written[0]} has a decimal comma; write {written[0].replace(',', '.')}" if written else ""
+
+
+def _twice(text: str, error: str) -> str:
+    """The line with the key that stands twice in a table, where an error of the parser tells of one; empty where none does."""
+    told = re.search(r"(?:overwrite a value|twice|already).*at line (\d+)", error)
+    return f": the key of {text.split(chr(10))[int(told[1]) - 1].strip()!r} has a value already" if told else ""
 
 
 def read_file(kind: str, file: Path) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.built.drawn import GRADES, drawn
 from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.carrier import check_carriers
-from thermospindle.model.errors import BadInput, NoEquilibrium, instead
+from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange, instead
 from thermospindle.model.files.formats import KEY, SCENE, migrated
 from thermospindle.model.machine import Bearing, Condition, Provenance, Spindle
 from thermospindle.model.rotor.beam import with_shafts
@@ -85,6 +85,13 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
     """The spindle of the parsed TOML `raw`; `file` serves messages only."""
     raw, form = formed(raw, file)
     _check_catalogues(form, file)
+    try:
+        return _built(raw, form, file)
+    except OutsideRange as error:
+        raise BadInput(f"{file}: reference_temperature_C = {form.reference_temperature_C:g}: {error}; allowed is one that every law of the scene reaches") from None
+
+
+def _built(raw: dict[str, Any], form: scene_file.Scene, file: Path) -> Spindle:
     spindle = form.spindle(name=file.parent.name, file=file, provenance=_provenance(file, raw))
     spindle = _with_shafts(file, spindle)
     check_section(file, spindle)

@@ -260,7 +260,7 @@ def _show_modes(console: Console, c: Comparison) -> None:
             rows.append([name, str(m.number), m.kind, *frequencies, *error, *beside])
     show_grid(console, "Modes, computed - measured", columns, rows, ("test", "kind"), keys=3)
     console.print(
-        f"+-: standard error of the measured frequency, with what the test's temperature is uncertain by and the model's numerical error of {1e6 * FREQUENCY_FLOOR:.0f} ppm", highlight=False
+        f"+-: standard error of the measured frequency, with what repeats scatter by beyond it, the test's temperature is uncertain by, and the model's numerical error of {1e6 * FREQUENCY_FLOOR:.0f} ppm", highlight=False
     )
     _show_unsure(console, c)
     if any(m.close and m.mac is not None for t in c.tests for m in t.modes):

@@ -45,7 +45,7 @@ def table_json(table: StiffnessTable) -> dict[str, Any]:
         columns = [*JSON_COLUMNS, *FURTHER]
         return {name: {c: [None if np.isnan(x) else x for x in v[c][:, speed].tolist()] for c in columns if c in v} for name, v in table.values.items()}
 
-    answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
+    answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads), "loose": {name: table.loose(name) or None for name in table.unloads}}
     if len(table.speed) > 1:
         answer["speeds"] = [{"speed_rpm": in_rpm(s), "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
     return answer | {"provenance": dict(table.provenance)}
@@ -140,9 +140,18 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
         console.print("Stiffness between these directions, as k_xz, is in table.csv of --out.")
     if pressed := _pressed(table):
         console.print(pressed, highlight=False)
-    for name, where in table.unloads.items():
-        if where is not None:
-            console.print(f"{name} bearing loses contact at {where:.2f} C")
+    for name in table.unloads:
+        if loose := _loose(table, name):
+            console.print(loose)
+
+
+def _loose(table: StiffnessTable, name: str) -> str:
+    """Where a bearing has no contact, in words; empty where it has contact everywhere."""
+    where, loose, low, high = table.unloads[name], table.loose(name), table.temperature[0], table.temperature[-1]
+    speed = f" at {table.speed[0] / RPM:g} rpm" if len(table.speed) > 1 else ""
+    if loose == "throughout":
+        return f"{name} bearing has no contact at {f'{low:g} C' if low == high else f'any of {low:g} to {high:g} C'}{speed}; where it has was not asked"
+    return f"{name} bearing {'loses contact at' if loose == 'above' else 'has no contact below'} {where:.2f} C{speed}" if loose else ""
 
 
 def _apart(values: Mapping[str, Array]) -> bool:
@@ -252,7 +261,7 @@ def show_static(console: Console, values: dict[str, Any], answers: Sequence[Arou
     told = f"bearings {values['bearings']}" + (f", beam {values['beam']}" if values["beam"] != "none" else "")
     show_grid(
         console,
-        f"Stiffness at each point, and what every bearing bears of 1 N there ({told})",
+        f"Stiffness at each point, and the reaction of every bearing to 1 N there ({told})",
         ["point", "along", "stiffness\nN/um", *(f"{name}\nN" for name in reactions)],
         [[name, along, _stiffness(row), *("-" if row["free"] else f"{row['reactions_N'].get(b, 0.0):+z.4f}" for b in reactions)] for name, along, row in rows],
         words=("point", "along"),

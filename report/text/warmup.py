@@ -163,8 +163,8 @@ def told(warmup: Warmup) -> str:
 
 
 def without_steady(warmup: Warmup) -> str:
-    """That there is no steady state, and why; empty where there is one."""
-    return f"There is no steady state: {warmup.unsteady}." if warmup.unsteady else ""
+    """That no steady state was found, and why; empty where one was."""
+    return f"No steady state was found: {warmup.unsteady}." if warmup.unsteady else ""
 
 
 def _at_the_end(warmup: Warmup) -> str:

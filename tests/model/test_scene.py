@@ -34,6 +34,9 @@ def test_a_file_that_is_not_there_or_not_toml(tmp_path):
         (tmp_path / "spindle.toml").write_text(f"title = 'one, two'\n{line}\n", encoding="utf-8")
         with pytest.raises(BadInput, match=rf"not a TOML file: .* \(at line \d, column \d+\): {re.escape(said)}$"):
             load(tmp_path)
+    (tmp_path / "spindle.toml").write_text("balls = 14\nballs = 15\n", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"not a TOML file: .*line 2.*: the key of 'balls = 15' has a value already$"):
+        load(tmp_path)
     (tmp_path / "spindle.toml").write_text("a = 1,5 = 2\nb = [1,2", encoding="utf-8")
     with pytest.raises(BadInput, match=r"not a TOML file: "):
         load(tmp_path)
@@ -127,6 +130,18 @@ def test_a_law_that_does_not_reach_names_its_key(raw):
     unnamed = replace(spindle, materials=spindle.materials | {"steel": replace(spindle.materials["steel"], youngs_modulus=Law(law.temperature, law.value))})
     assert unnamed == spindle
     assert content_hash(unnamed) == content_hash(spindle)
+
+
+@pytest.mark.parametrize(("edit", "told"), [({"reference_temperature_C": 295.0}, "given from -20 to 120 C was asked at 295 C"), ({"steel": [25.0, 60.0]}, "given from 25 to 60 C was asked at 20 C")])
+def test_a_reference_that_no_law_reaches_names_its_key(raw, edit, told):
+    """Kelvin typed for degrees, or a table that begins above the reference: the key of the law alone was told."""
+    if "steel" in edit:
+        raw["materials"]["steel"]["youngs_modulus_GPa"] = {"temperature_C": edit["steel"], "value": [200.0, 190.0]}
+    else:
+        raw |= edit
+        raw["materials"]["steel"]["youngs_modulus_GPa"] = {"temperature_C": [-20.0, 120.0], "value": [200.0, 190.0]}
+    with pytest.raises(BadInput, match=rf"spindle.toml: reference_temperature_C = [\d.]+: materials.steel.youngs_modulus_GPa: a law {told}; allowed is one that every law of the scene reaches$"):
+        build(raw, FILE)
 
 
 def test_what_a_scene_leaves_out_is_assumed_and_said(raw):

@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -175,6 +176,19 @@ def test_says_where_a_bearing_unloads(spindle):
     below, above = (stiffness_table(spindle, [t]).values["upper"]["contact_force_N"][0, 0] for t in (where - 0.01, where + 0.01))
     assert below > 0
     assert above == 0
+
+
+def test_says_on_which_side_a_bearing_is_loose(spindle):
+    """Also where the search for the temperature meets rings that nothing holds, as between 140 and 150 C; and where no temperature was asked
+    at which there is contact, of which the lowest one is told. Colder rings that let go get their contact in the warmth."""
+    table = stiffness_table(spindle, [140.0, 150.0])
+    assert table.unloads["upper"] == pytest.approx(stiffness_table(spindle, [20.0, 150.0]).unloads["upper"], abs=2e-3)
+    assert table.loose("upper") == "above"
+    none = stiffness_table(spindle, [150.0, 160.0])
+    assert (none.unloads["upper"], none.loose("upper")) == (150.0, "throughout")
+    assert stiffness_table(spindle, [20.0, 60.0]).loose("upper") == ""
+    force = {"contact_force_N": np.array([[0.0], [3.0]])}
+    assert replace(none, values={"upper": force}).loose("upper") == "below"
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "# provenance: {}\n# unloads_C: {}\nbearing,temperature_C\nupper,x\n"])
