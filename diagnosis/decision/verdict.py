@@ -91,8 +91,12 @@ def _unheld(
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
-    if moving(found.model, found.base, discount(best, same)):
-        little = [c for c in (*candidates, *free) if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances)]
+    by = discount(best, same)
+    if moving(found.model, found.base, by):
+        little = [
+            c for c in (*candidates, *free)
+            if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances) and moving(found.model, c.hypothesis, by)  # beside which it moves, too
+        ]
         moves = Candidate(found.base, (MOVING,), True, 0.0, none + sum(c.probability for c in little))
         candidates, free = (tuple(replace(c, probability=0.0) if c in little else c for c in every) for every in (candidates, free))
         free, none = (*free, moves), 0.0

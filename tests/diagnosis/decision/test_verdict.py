@@ -71,6 +71,17 @@ def test_a_name_beside_which_something_drifts_is_as_probable_as_it_is_told():
     assert max(c.probability for c in mostly.candidates) < 0.01
 
 
+@pytest.mark.parametrize(("beside", "word"), [(True, "unexplained"), (False, "identified")])
+def test_a_resonance_that_moves_without_effects_alone_stands_in_for_one(beside, word, monkeypatch):
+    """A light resonance gained 300 without effects, and moved there with temperature; an effect gains 100 more. Where the resonance
+    moves beside it too, that is what is unknown; where it does not, the effect is what moved (blind campaign 3344)."""
+    found = replace(made({"a": 100.0}), by_resonances=300.0)
+    resonance = SimpleNamespace(frequency=500.0, drift=(0.1, 0.0), frequency_at=lambda far: 500.0 + 10 * far)
+    monkeypatch.setattr(verdict, "moving", lambda model, h, discount: [resonance] if beside or not h.mechanisms else [])
+    monkeypatch.setattr(reason, "moving", lambda model, h, *discount: [])
+    assert decide(found).word == word
+
+
 def test_a_false_alarm_costs_what_is_stated():
     """One effect against nothing: named from where MISSED P(something) exceeds FALSE_ALARM P(nothing), found by bisection."""
     low, high = 0.0, 30.0
