@@ -59,11 +59,11 @@ def unseen_beside(found: Search, accepted: Hypothesis) -> tuple[str, ...]:
     would show alone, but not beside it: how much of what it explains is theirs, nobody can tell."""
     alike = {name for m in accepted.mechanisms for name in m.effect.resembles} - set(accepted.names)
     asked = [s.mechanism for s in found.screened if s.mechanism.name in alike and s.mechanism.kind == "law" and s.visibility > 0]
-    alone, beside = (_shown(found.model, h.fit, accepted.evidence.learned, asked) for h in (found.base, accepted))
+    alone, beside = in_parallel(partial(_shown, found.model, accepted.evidence.learned, asked), [found.base.fit, accepted.fit])
     return tuple(name for name in alone if alone[name] > SHOWS and beside[name] < HIDES)
 
 
-def _shown(model: CampaignModel, about: Fit, learned: Learned, mechanisms: Sequence[Mechanism]) -> dict[str, float]:
+def _shown(model: CampaignModel, learned: Learned, mechanisms: Sequence[Mechanism], about: Fit) -> dict[str, float]:
     """Standard errors of the typical size of every effect beside what is fitted already, of the variant that shows most."""
     seen: dict[str, float] = {}
     for m, shows in zip(mechanisms, visibilities(model, about, learned, mechanisms), strict=True):
