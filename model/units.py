@@ -21,6 +21,10 @@ def in_rpm(speed: float) -> float:
     return float(f"{speed / RPM:.12g}")
 
 
-def in_nm(length: float) -> str:
-    """A small length (m) with its unit, to three digits: nm, or um from 1000 nm on."""
-    return f"{TO_NM * length:.3g} nm" if abs(TO_NM * length) < 999.5 else f"{TO_UM * length:.3g} um"
+def small_length(length: float, least: str = "nm") -> str:
+    """A length (m) in words, to three digits: in the `least` unit, or in um or mm from 1000 of the one below on."""
+    units = {"nm": TO_NM, "um": TO_UM, "mm": TO_MM}
+    for unit in list(units)[list(units).index(least) :]:
+        if abs(units[unit] * length) < 999.5 or unit == "mm":
+            break
+    return f"{units[unit] * length:.3g} {unit}"

@@ -244,21 +244,32 @@ def stiffness_table(spindle: Spindle, temperatures: Sequence[float], speeds: Seq
     return tabulate(temperatures, speeds, states, lost, provenance(spindle), [[pressures(point.spindle, point.state) for point in row] for row in points])
 
 
+BESIDE, NEARLY = 0.02, 0.1
+"""K beside the temperature at which a bearing loses contact, and what it may be pressed by there of where it surely is."""
+
+
 def unloads(spindle: Spindle, points: Sequence[OperatingPoint], bearing: str) -> float | None:
     """Temperature (C) between two neighbouring points, the first such two, at which a bearing loses contact, or gets it in the
     warmth, to a millikelvin; the lowest of the points where it has none at any of them."""
+
+    failed: list[NoEquilibrium] = []
 
     def deformation(temperature: float) -> float:
         condition = Condition(temperature, points[0].condition.speed)
         try:
             state = operating_point(spindle, condition).state.bearing(bearing)
-        except NoEquilibrium:  # between rows that are let go nothing holds the rings
+        except NoEquilibrium as error:  # between rows that are let go nothing holds the rings
+            failed.append(error)
             return -1e-12
         return state.deformation if state.in_contact else min(state.deformation, -1e-12)
 
     for cold, hot in pairwise(points):
         if cold.state.bearing(bearing).in_contact != hot.state.bearing(bearing).in_contact:
-            return float(scipy.optimize.brentq(deformation, cold.condition.temperature, hot.condition.temperature, xtol=1e-3))
+            found = float(scipy.optimize.brentq(deformation, cold.condition.temperature, hot.condition.temperature, xtol=1e-3))
+            held = cold if cold.state.bearing(bearing).in_contact else hot
+            if failed and not 0 < deformation(found + np.copysign(BESIDE, held.condition.temperature - found)) < NEARLY * held.state.bearing(bearing).deformation:
+                raise failed[0]  # for another reason: it is pressed right beside
+            return found
     return None if points[0].state.bearing(bearing).in_contact else points[0].condition.temperature
 
 

@@ -23,9 +23,9 @@ from thermospindle.diagnosis.decision.explanations import (
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
 from thermospindle.diagnosis.decision.reason import LEFT, MOVING, UNBUILT, UNTOLD, drifts, unbuilt
 from thermospindle.diagnosis.inference.evidence import left_out
-from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.inference.hypothesis import PLENTY, Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
-from thermospindle.diagnosis.inference.resonance import moving
+from thermospindle.diagnosis.inference.resonance import moving, travelled
 from thermospindle.diagnosis.inference.search import Search
 
 GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
@@ -91,12 +91,8 @@ def _unheld(
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
-    by = discount(best, same)
-    if moving(found.model, found.base, by):
-        little = [
-            c for c in (*candidates, *free)
-            if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances) and moving(found.model, c.hypothesis, by)  # beside which it moves, too
-        ]
+    if moving(found.model, found.base, discount(best, same)):
+        little = [c for c in (*candidates, *free) if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances) and not _stills(found, c)]
         moves = Candidate(found.base, (MOVING,), True, 0.0, none + sum(c.probability for c in little))
         candidates, free = (tuple(replace(c, probability=0.0) if c in little else c for c in every) for every in (candidates, free))
         free, none = (*free, moves), 0.0
@@ -113,6 +109,11 @@ def _unheld(
     if best.mechanisms and all(m.free for m in best.mechanisms) and best.fit.chi2 > GROSS * best.fit.count:  # what drifts in it does not explain the data either
         free = (*(replace(c, probability=0.0) for c in free), Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in free)))
     return candidates, tuple(sorted(free, key=lambda c: -c.probability)), none
+
+
+def _stills(found: Search, c: Candidate) -> bool:
+    """Whether a candidate explains what a light resonance moved for without it: beside it none moves, or most of the way no more."""
+    return c.delta_evidence > PLENTY and travelled(found.model, c.hypothesis) < (1 - MOSTLY) * travelled(found.model, found.base)
 
 
 def changing(h: Hypothesis, same: Overlap) -> float:

@@ -42,7 +42,7 @@ class Hypothesis:
         """Without the rates of its fit, to be sent and kept."""
         return replace(self, fit=replace(self.fit, rates=None))
 
-    def of(self, mechanisms: tuple[Mechanism, ...]) -> Hypothesis:
+    def with_mechanisms(self, mechanisms: tuple[Mechanism, ...]) -> Hypothesis:
         """With these very mechanisms: what comes back from another process has copies of them."""
         return replace(self, fit=replace(self.fit, mechanisms=mechanisms))
 
@@ -105,7 +105,7 @@ def fitted(
     if not tasks:
         return []
     found = in_parallel(partial(_fit_one, model, rated(model, about).rates, tuple(tempers), most, expected, afresh, min(most, beaten)), tasks, workers)
-    return [h.of(task.mechanisms) for h, task in zip(found, tasks, strict=True) if h is not None]
+    return [h.with_mechanisms(task.mechanisms) for h, task in zip(found, tasks, strict=True) if h is not None]
 
 
 def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, beaten: float, task: Task) -> Hypothesis | None:

@@ -113,11 +113,7 @@ def shown(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
 def moving(model: CampaignModel, h: Hypothesis, discount: float = 1.0) -> list[Resonance]:
     """Those whose frequency is surely another at another temperature, where ln evidence counts by a `discount` less."""
     needed = _needed(model, h)
-    if not needed:
-        return []
-    far = np.array([model.far(t) for t in range(len(model.tests))])
-    by_drift = np.stack([far, far**2], axis=1)
-    by_drift = by_drift[:, None] - by_drift[None]  # of every two tests
+    by_drift = _apart(model) if needed else np.zeros(0)
 
     def moves(r: Resonance, covariance: Array) -> bool:
         change = by_drift @ np.array(r.drift)
@@ -125,6 +121,18 @@ def moving(model: CampaignModel, h: Hypothesis, discount: float = 1.0) -> list[R
         return bool(np.any(np.abs(change) > np.maximum(MOVES, SURELY * np.sqrt(discount) * sd)))
 
     return [r for r, covariance in needed if moves(r, covariance)]
+
+
+def travelled(model: CampaignModel, h: Hypothesis) -> float:
+    """How far the light resonance that an explanation needs, and that moves most, moves over the tests, of its frequency; nothing of none."""
+    return max((float(np.abs(_apart(model) @ np.array(r.drift)).max()) for r, _ in _needed(model, h)), default=0.0)
+
+
+def _apart(model: CampaignModel) -> Array:
+    """What of a resonance's two parameters of drift every two tests (tests, tests, 2) have apart."""
+    far = np.array([model.far(t) for t in range(len(model.tests))])
+    by_drift = np.stack([far, far**2], axis=1)
+    return np.asarray(by_drift[:, None] - by_drift[None])
 
 
 def _needed(model: CampaignModel, h: Hypothesis) -> list[tuple[Resonance, Array]]:

@@ -78,7 +78,7 @@ def search(
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
     with meanwhile(partial(beside, model, best, workers), workers) as told:
         together = _together(model, none, tried, every, workers)  # as they are where the model stays as it is
-        wider, best_settled = told()
+        wider, ended = told()
     before = model
     if len(wider.resonances) > len(model.resonances):
         model = wider
@@ -87,22 +87,23 @@ def search(
             tried = fit_singles(model, none, every, lambda done: None, workers)  # steps that were counted already
         else:
             tried = carried_over(model, none, tried, len(before.parameters), workers)
-    elif best.evidence.learned.errors > STRAIN:
-        moves = with_resonance(model, none, workers, moves=True)
+    else:
+        best = ended.with_mechanisms(best.mechanisms)
+        moves = with_resonance(model, none, workers, moves=True) if best.evidence.learned.errors > STRAIN else None
         if moves is not None and moves[1].evidence.ln > best.evidence.ln + PLENTY:
             model, none = moves
             tried = fit_singles(model, none, every, lambda done: None, workers)
     tried, pairs = together if model is before else _together(model, none, tried, every, workers)
-    singles = better([*tried.singles, best_settled.of(best.mechanisms)]) if model is before and best.mechanisms else tried.singles
+    singles = better([*tried.singles, best]) if model is before and best.mechanisms else tried.singles
     pairs = better([*pairs, *joined_early(model, none, tried, pairs, every, workers)])
     found = better([*singles, *pairs, *without_one(model, [*singles, *pairs], tried.most, tried.expected, workers)])
     found = better([*found, *exchanged(model, found, tried, workers)])
     found = better([*found, *rivals_beside(model, found, tried, workers)])
     progress("pairs fitted")
     finalists = _finalists(found)
-    none, *ended = _ended(model, max((h.evidence.ln for h in found), default=-np.inf), [none, *finalists], workers)
-    none = _without_what_does_nothing(model, none, ended)
-    anew = dict(zip(map(id, finalists), ended, strict=True))
+    none, *at_the_end = _ended(model, max((h.evidence.ln for h in found), default=-np.inf), [none, *finalists], workers)
+    none = _without_what_does_nothing(model, none, at_the_end)
+    anew = dict(zip(map(id, finalists), at_the_end, strict=True))
     ranked = [anew.get(id(h), h) for h in found]
     ranked += _other_ways(model, [none, *ranked], every, tried, workers)
     progress("the best fitted anew")
@@ -142,7 +143,7 @@ def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Se
 def _ended(model: CampaignModel, best: float, found: Sequence[Hypothesis], workers: int | None) -> list[Hypothesis]:
     """Each fitted anew, with the very mechanisms that it has here, beside the `best` ln evidence so far."""
     ended = in_parallel(partial(_at_the_end, model, best), [h.light for h in found], workers)
-    return [e.of(h.mechanisms) for e, h in zip(ended, found, strict=True)]
+    return [e.with_mechanisms(h.mechanisms) for e, h in zip(ended, found, strict=True)]
 
 
 def _at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:

@@ -59,6 +59,8 @@ def unseen_beside(found: Search, accepted: Hypothesis) -> tuple[str, ...]:
     would show alone, but not beside it: how much of what it explains is theirs, nobody can tell."""
     alike = {name for m in accepted.mechanisms for name in m.effect.resembles} - set(accepted.names)
     asked = [s.mechanism for s in found.screened if s.mechanism.name in alike and s.mechanism.kind == "law" and s.visibility > 0]
+    if not asked:
+        return ()
     alone, beside = in_parallel(partial(_shown, found.model, accepted.evidence.learned, asked), [found.base.fit, accepted.fit])
     return tuple(name for name in alone if alone[name] > SHOWS and beside[name] < HIDES)
 

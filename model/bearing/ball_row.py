@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import hypot, sqrt
-from typing import Any
 
 import numpy as np
 import scipy
@@ -31,7 +30,7 @@ from thermospindle.model.bearing.heavy_ball.balance import (
     settled,
 )
 from thermospindle.model.bearing.heavy_ball.inertia import MANY, BallInertia, Vector, rolling
-from thermospindle.model.bearing.heavy_ball.together import at_own_speeds, of_each, settled_together
+from thermospindle.model.bearing.heavy_ball.together import at_own_speeds, of_each, of_numbers, settled_together
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium
@@ -256,7 +255,7 @@ def at_one_speed(rows: Sequence[BallRow], lines: Sequence[Array], near: Sequence
     rest = [k for k in range(len(rows)) if k not in found]
     if rest:
         rolled = [near[k] or _by_themselves(rows[k], lines[k]) for k in rest]
-        allowed = [tolerances(rows[k], lines[k]) for k in rest]
+        allowed = [tolerances(rows[k], _longest(lines[k])) for k in rest]
         own = at_own_speeds([rows[k].ball for k in rest], [lines[k] for k in rest], allowed, [r.cage for r in rolled], [r.centres for r in rolled])
         found |= dict(zip(rest, own, strict=True))
     return [found[k] for k in range(len(rows))]
@@ -267,8 +266,8 @@ def _without_others(row: BallRow, line: Array, near: Rolled | None) -> tuple[flo
     starts = None if near is None else near.centres
     if not np.ptp(line, axis=0).any():
         start = None if starts is None else (float(starts[0][0]), float(starts[1][0]))
-        cage, *alike = of_alike(row, (float(line[0, 0]), float(line[0, 1])), start)
-        return cage, *(_of_all(one, row.balls) for one in alike)
+        cage, here, each = of_alike(row, (float(line[0, 0]), float(line[0, 1])), start)
+        return cage, of_numbers(here, lambda x: np.full(row.balls, x)), of_numbers(each, lambda x: np.full(row.balls, x))
     if row.inertia is None or row.inertia.cage is None:
         return None
     here = _settled(row, line, starts)
@@ -282,14 +281,14 @@ def _by_themselves(row: BallRow, line: Array) -> Rolled:
 
 
 def _settled(row: BallRow, line: Array, starts: Vector | None = None) -> Balance:
-    tolerance, least = tolerances(row, line)
+    tolerance, least = tolerances(row, _longest(line))
     return settled_together(of_each([row.ball], [row.balls]), tuple(line.T), np.full(row.balls, tolerance), np.full(row.balls, least), starts)
 
 
 def of_alike(row: BallRow, line: Vector, start: Vector | None = None) -> tuple[float, Balance, Driven]:
     """Speed of the cage of balls that all have the same `line`, and what one of them is: it rolls with them."""
     ball = row.ball
-    here = settled(ball, line, *tolerances(row, line), start)
+    here = settled(ball, line, *tolerances(row, hypot(*line)), start)
     cage = ball.inertia.cage
     if cage is None:
         cage = rolling(ball.inertia, here.centre, line).speed
@@ -298,15 +297,13 @@ def of_alike(row: BallRow, line: Vector, start: Vector | None = None) -> tuple[f
     return cage, here, driven(ball, here, line)
 
 
-def _of_all(one: Any, balls: int) -> Any:
-    """What one ball is, a tuple of numbers and tuples of them, of as many that are alike."""
-    return type(one)(*(tuple(np.full(balls, x) for x in v) if isinstance(v, tuple) else np.full(balls, v) for v in one))
+def _longest(line: Array) -> float:
+    return float(np.hypot(*line.T).max())
 
 
-def tolerances(row: BallRow, line: Vector | Array) -> tuple[float, float]:
+def tolerances(row: BallRow, longest: float) -> tuple[float, float]:
     """Of the resultant on a settled ball (N), and of the stiffness added to the step of one that
-    touches nothing (N/m), for groove centres apart by a `line`, or by no more than the longest of many (balls, 2)."""
-    longest = float(np.hypot(*line.T).max()) if isinstance(line, np.ndarray) else hypot(*line)
+    touches nothing (N/m); no groove centres are farther apart than `longest` (m)."""
     stretch, flung = max(LEAST_STRETCH, longest - row.unloaded_distance), row.ball.inertia.flung
     contact = row.constant * stretch**1.5
     tolerance, least = 1e-12 * contact + 1e-13 * flung, 1e-9 * row.constant * sqrt(stretch)

@@ -69,7 +69,7 @@ def centred_axial(row: BallRow, movement: float, centres: Centres | None = None)
     if row.heavy:
         centres = {} if centres is None else centres
         line = -row.radial, axial
-        found = settled(row.ball, line, *tolerances(row, line), centres.get(id(row)))  # all balls roll alike, and the cage with them
+        found = settled(row.ball, line, *tolerances(row, hypot(*line)), centres.get(id(row)))  # all balls roll alike, and the cage with them
         centres[id(row)] = found.centre
         return row.balls * found.on_outer[1], row.balls * found.stiffness()[3]
     length, _, force, along = _pull(row, axial)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.bearing.roller import RollerState
@@ -86,8 +87,12 @@ class StiffnessTable:
         it, or `throughout` the grid, whose lowest temperature that is then; empty where it has contact everywhere."""
         if self.unloads.get(bearing) is None:
             return ""
-        contact = self.values[bearing]["contact_force_N"][:, 0] > 0
+        contact = self.contact(bearing)
         return "above" if contact[0] else "below" if contact.any() else "throughout"
+
+    def contact(self, bearing: str) -> NDArray[np.bool_]:
+        """Whether a bearing has contact at every temperature (n,), at the lowest speed."""
+        return np.asarray(self.values[bearing]["contact_force_N"][:, 0] > 0)
 
     def at(self, bearing: str, column: str, temperature: float, speed: float = 0.0) -> float:
         """Property at a condition, shape-preserving cubic (PCHIP) between the grid's conditions.

@@ -66,13 +66,22 @@ def _light(rows: Sequence[_Row]) -> Answer:
 
 
 def _asked(rows: Sequence[_Row]) -> Callable[[Sequence[Array]], list[RowForce]]:
-    """What rows of balls answer at displacements of theirs: sought together, from where the balls were when last asked."""
-    last: list[Rolled | None] = [None] * len(rows)
+    """What rows of balls answer at displacements of theirs: sought together, from where the balls were when last asked;
+    or, where loose ones lead nowhere from there, from where they were when first asked."""
     balls = [row.row for row in rows if isinstance(row.row, BallRow)]
+    first: list[Rolled | None] = [None] * len(balls)
+    last = first
 
     def ask(qs: Sequence[Array]) -> list[RowForce]:
-        told = ball_row.respond_all(balls, qs, last)
-        last[:] = [own.rolled for own in told]
+        nonlocal first, last
+        try:
+            told = ball_row.respond_all(balls, qs, last)
+        except NoEquilibrium:
+            if last is first:
+                raise
+            told = ball_row.respond_all(balls, qs, first)
+        last = [own.rolled for own in told]
+        first = last if None in first else first
         return told
 
     return ask

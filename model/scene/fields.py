@@ -186,9 +186,13 @@ def _by_comma(text: str, error: str) -> str:
 
 
 def _twice(text: str, error: str) -> str:
-    """The line with the key that stands twice in a table, where an error of the parser tells of one; empty where none does."""
-    told = re.search(r"(?:overwrite a value|twice|already).*at line (\d+)", error)
-    return f": the key of {text.split(chr(10))[int(told[1]) - 1].strip()!r} has a value already" if told else ""
+    """The key, or table, that stands twice, where an error of the parser tells of one, at the end of its value; empty where none does."""
+    told = re.search(r"(?:overwrite|twice|already|[Dd]uplicate).*at (?:line (\d+)|end of document)", error)
+    if told is None:
+        return ""
+    before = text.rstrip().split("\n")[: int(told[1]) if told[1] else None]
+    at = next((line.strip() for line in reversed(before) if re.match(r"\s*(?:\[|[\w.\"'-]+\s*=)", line) and line.strip() not in "[]"), "")
+    return f": {at} stands already" if at.startswith("[") else f": {at.split('=')[0].strip()!r} has a value already, and was given another" if at else ""
 
 
 def read_file(kind: str, file: Path) -> dict[str, Any]:

@@ -86,22 +86,9 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
     raw, form = formed(raw, file)
     _check_catalogues(form, file)
     try:
-        return _built(raw, form, file)
+        spindle = _at_reference(raw, form, file)
     except OutsideRange as error:
         raise BadInput(f"{file}: reference_temperature_C = {form.reference_temperature_C:g}: {error}; allowed is one that every law of the scene reaches") from None
-
-
-def _built(raw: dict[str, Any], form: scene_file.Scene, file: Path) -> Spindle:
-    spindle = form.spindle(name=file.parent.name, file=file, provenance=_provenance(file, raw))
-    spindle = _with_shafts(file, spindle)
-    check_section(file, spindle)
-    spindle = _with_loaded_angles(form, spindle)
-    check_bearings(file, spindle)
-    check_rollers(file, spindle)
-    check_raceways(file, spindle)
-    check_structure(file, spindle)
-    check_carriers(spindle)
-    spindle = _as_built(file, _with_section_inertia(spindle))
     if form.hammer_test.step_us is None:
         try:
             spindle = replace(spindle, hammer=replace(spindle.hammer, step=chosen_step(spindle)))
@@ -111,6 +98,20 @@ def _built(raw: dict[str, Any], form: scene_file.Scene, file: Path) -> Spindle:
     if own.seed is not None and own.grade is not None:
         spindle = replace(spindle, imperfections=drawn(spindle, own.seed, GRADES[own.grade]))
     return spindle
+
+
+def _at_reference(raw: dict[str, Any], form: scene_file.Scene, file: Path) -> Spindle:
+    """What is drawn and mounted; `OutsideRange` where a law does not reach the reference temperature."""
+    spindle = form.spindle(name=file.parent.name, file=file, provenance=_provenance(file, raw))
+    spindle = _with_shafts(file, spindle)
+    check_section(file, spindle)
+    spindle = _with_loaded_angles(form, spindle)
+    check_bearings(file, spindle)
+    check_rollers(file, spindle)
+    check_raceways(file, spindle)
+    check_structure(file, spindle)
+    check_carriers(spindle)
+    return _as_built(file, _with_section_inertia(spindle))
 
 
 @lru_cache(maxsize=1)

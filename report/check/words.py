@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 
 from thermospindle.model.errors import listed
+from thermospindle.model.units import small_length
 from thermospindle.report.text.grid import show_grid
 
 NOTABLE = 0.005
@@ -137,7 +138,7 @@ def _across(values: Mapping[str, Any], several: bool) -> list[str]:
 def _rollers(name: str, b: Mapping[str, Any]) -> str:
     rows = "a row of" if b["rows"] == 1 else f"{b['rows']} rows of"
     clear = b["clearance_um"]
-    fit = f"pressed by {_um(-clear)} across, {b['roller_force_N']:.3g} N each" if clear < 0 else f"with {_um(clear)} of clearance across" + (f", the most loaded with {b['roller_force_N']:.3g} N" if b["roller_force_N"] else "")
+    fit = f"pressed by {small_length(-1e-6 * clear, 'um')} across, {b['roller_force_N']:.3g} N each" if clear < 0 else f"with {small_length(1e-6 * clear, 'um')} of clearance across" + (f", the most loaded with {b['roller_force_N']:.3g} N" if b["roller_force_N"] else "")
     spread = (
         f" Taken is the mean over all places of its cage: a shaft at rest has one of them, which is stiffer or softer across by up to {100 * b['cage_spread']:.2g}%."
         if b["cage_spread"] > NOTABLE else ""
@@ -180,8 +181,3 @@ def _list(console: Console, title: str, items: list[str]) -> None:
     console.print(f"\n{title}:", style="bold")
     for item in items:
         console.print(f"  - {item}", markup=False, highlight=False)
-
-
-def _um(length: float) -> str:
-    """Of um, in words; mm from 1000 um on."""
-    return f"{length:.3g} um" if length < 999.5 else f"{length / 1e3:.3g} mm"

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM, TO_NM, in_nm
+from thermospindle.model.units import RPM, TO_NM, small_length
 from thermospindle.report.figures.common import INK, PALE, STYLE, colour, spread
 from thermospindle.sim.posing import round_down
 from thermospindle.sim.running.lines import FoundLine
@@ -91,7 +91,7 @@ def _polar(axes: PolarAxes, cut: Revolutions, probe: int, quoted: ErrorMotion, t
     axes.tick_params(axis="y", labelsize=7)
     axes.set_title(title, pad=10)
     errors = {"total": quoted.total_error, "synchronous": quoted.synchronous_error} | ({"asynchronous": quoted.asynchronous_error} if rolls else {})
-    text = "\n".join(f"{name} {in_nm(value)}" if TO_NM * value > 1e-3 else f"{name} 0 nm" for name, value in errors.items()) + ("" if rolls else "\nasynchronous unknown")
+    text = "\n".join(f"{name} {small_length(value)}" if TO_NM * value > 1e-3 else f"{name} 0 nm" for name, value in errors.items()) + ("" if rolls else "\nasynchronous unknown")
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=7.5, linespacing=1.35)
 
 
@@ -186,7 +186,7 @@ def waterfall_figure(spectra: Sequence[LineSpectrum], direction: str, size: tupl
             natural = spectra[k].natural[spectra[k].natural < highest]
             axes.plot(natural, np.full(len(natural), speeds[k]), ".", color=INK, ms=2.5)
         axes.set(xlabel="frequency, Hz", ylabel="speed, rpm", xlim=(0, highest))
-        title = f"A line at its speed: {RANGE:g} dB below the strongest of all, {in_nm(float(amplitude.max()))} zero to peak.\nPeaks rise above it on a scale of dB. Dots: natural frequencies"
+        title = f"A line at its speed: {RANGE:g} dB below the strongest of all, {small_length(float(amplitude.max()))} zero to peak.\nPeaks rise above it on a scale of dB. Dots: natural frequencies"
         axes.set_title(title, fontsize=7.5, fontweight="normal")
         axes.grid(visible=False)
     return figure

@@ -8,7 +8,7 @@ from markupsafe import escape
 from matplotlib.figure import Figure
 
 from thermospindle.diagnosis.runout.compare import RunoutBeside, rms_residual
-from thermospindle.model.units import TO_NM, in_nm
+from thermospindle.model.units import TO_NM, small_length
 from thermospindle.report.figures.common import label, pictures
 from thermospindle.report.figures.runout_campaign import PANELS, strongest_probe
 from thermospindle.report.page.report import Section
@@ -40,13 +40,13 @@ def _summary(found: Sequence[RunoutBeside], errors: Mapping[str, float | None] |
         g, t = worst
         words.append(
             f" The largest: {signed(g.residual, 1)} standard errors at {g.frequency:.1f} Hz, node {g.node}, in {escape(t.test.id)}: "
-            f"computed {in_nm(g.computed)}, measured {in_nm(g.measured)}."
+            f"computed {small_length(g.computed)}, measured {small_length(g.measured)}."
         )
     words.append("</p>")
     for tests, one, other in before_after(errors or {}):
         words.append(f"<p>{tests.capitalize()} tests: {one:.3g} → {other:.3g} standard errors.</p>")
     unknown = [(t, u) for t in found for u in t.unexplained]
-    items = [f"{escape(t.test.id)}: {u.frequency:.1f} Hz, {u.order:.3f} orders, {in_nm(u.amplitude)} at node {u.node}" for t, u in unknown]
+    items = [f"{escape(t.test.id)}: {u.frequency:.1f} Hz, {u.order:.3f} orders, {small_length(u.amplitude)} at node {u.node}" for t, u in unknown]
     return minus("".join(words)) + (f"<p>Lines that no theory of bearings explains:</p><ul>{''.join(f'<li>{minus(i)}</li>' for i in items)}</ul>" if items else "")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from thermospindle.model.units import in_nm
+from thermospindle.model.units import small_length
 from thermospindle.report.figures.common import pictures
 from thermospindle.report.page.report import Section
 from thermospindle.report.text.diagnosis.words import next_words
@@ -47,7 +47,7 @@ def _verdict(answer: dict[str, Any]) -> str:
     card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
     said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change"))
     strange = [
-        f"<li>{minus(escape(g['test']))}: {g['frequency_Hz']:.1f} Hz, {g['order']:.3f} orders, {in_nm(1e-6 * g['amplitude_um'])} at node {g['node']}</li>"
+        f"<li>{minus(escape(g['test']))}: {g['frequency_Hz']:.1f} Hz, {g['order']:.3f} orders, {small_length(1e-6 * g['amplitude_um'])} at node {g['node']}</li>"
         for g in answer["unexplained_lines"]
     ]
     unknown = f"<p>Lines that no imperfection has:</p><ul>{''.join(strange)}</ul>" if strange else ""

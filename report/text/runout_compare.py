@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.diagnosis.runout.compare import LineBeside, PartBeside, RunoutBeside, rms_residual
-from thermospindle.model.units import TO_UM, in_nm, in_rpm
+from thermospindle.model.units import TO_UM, in_rpm, small_length
 from thermospindle.report.text.grid import grid, show_grid
 
 SHOWN = 12  # lines of a table
@@ -79,7 +79,7 @@ def show_runout_comparison(console: Console, found: Sequence[RunoutBeside], verb
         show_grid(console, f"{t.test.id}: lines, nm zero to peak", columns, lines, WORDS, keys=4)
     for t in found:
         for s in t.unexplained:
-            console.print(f"{t.test.id}: unexplained line at {s.frequency:.1f} Hz, {in_nm(s.amplitude)} at node {s.node}", highlight=False)
+            console.print(f"{t.test.id}: unexplained line at {s.frequency:.1f} Hz, {small_length(s.amplitude)} at node {s.node}", highlight=False)
     parts = grid("Runout parts, rms, nm", ("test", "node", "RRO", "computed", "NRRO", "computed"), WORDS)
     for t in found:
         for r, n in zip(t.rro, t.nrro, strict=True):

@@ -151,7 +151,9 @@ def _loose(table: StiffnessTable, name: str) -> str:
     speed = f" at {table.speed[0] / RPM:g} rpm" if len(table.speed) > 1 else ""
     if loose == "throughout":
         return f"{name} bearing has no contact at {f'{low:g} C' if low == high else f'any of {low:g} to {high:g} C'}{speed}; where it has was not asked"
-    return f"{name} bearing {'loses contact at' if loose == 'above' else 'has no contact below'} {where:.2f} C{speed}" if loose else ""
+    again = table.contact(name)[-1] == (loose == "above")
+    end = f"; at {high:g} C it has {'it again' if loose == 'above' else 'none either'}" if again else ""
+    return f"{name} bearing {'loses contact at' if loose == 'above' else 'has no contact below'} {where:.2f} C{speed}{end}" if loose else ""
 
 
 def _apart(values: Mapping[str, Array]) -> bool:

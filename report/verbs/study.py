@@ -168,8 +168,8 @@ def _show(console: Console, values: dict[str, Any]) -> None:
     for name, u in values.get("unloads_C", {}).items():
         if u["share"]:
             s = u["spread"]
-            at = f" at {s['mean']:.1f} +- {s['sd']:.1f} C" if s else ""
-            console.print(f"{name} loses contact within the temperatures of the study in {100 * u['share']:.1f} % of the draws{at}")
+            at = f", first lost or had at {s['mean']:.1f} +- {s['sd']:.1f} C" if s else ""
+            console.print(f"{name} has no contact at some temperature of the study in {100 * u['share']:.1f} % of the draws{at}")
 
 
 def _line(label: str, nominal: float, own: dict[str, Any]) -> list[str]:

@@ -34,9 +34,15 @@ def test_a_file_that_is_not_there_or_not_toml(tmp_path):
         (tmp_path / "spindle.toml").write_text(f"title = 'one, two'\n{line}\n", encoding="utf-8")
         with pytest.raises(BadInput, match=rf"not a TOML file: .* \(at line \d, column \d+\): {re.escape(said)}$"):
             load(tmp_path)
-    (tmp_path / "spindle.toml").write_text("balls = 14\nballs = 15\n", encoding="utf-8")
-    with pytest.raises(BadInput, match=r"not a TOML file: .*line 2.*: the key of 'balls = 15' has a value already$"):
-        load(tmp_path)
+    for text, said in (
+        ("balls = 14\nballs = 15\n", "'balls' has a value already, and was given another"),
+        ("balls = 14\nballs = 15", "'balls' has a value already, and was given another"),
+        ("z = [\n1,\n]\nz = [\n1,\n2,\n]\nb = 1\n", "'z' has a value already, and was given another"),
+        ("[x]\na = 1\n[x]\nb = 1\n", "[x] stands already"),
+    ):
+        (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(BadInput, match=rf"not a TOML file: .*: {re.escape(said)}$"):
+            load(tmp_path)
     (tmp_path / "spindle.toml").write_text("a = 1,5 = 2\nb = [1,2", encoding="utf-8")
     with pytest.raises(BadInput, match=r"not a TOML file: "):
         load(tmp_path)

@@ -3,6 +3,7 @@
 import json
 import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,13 +11,13 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.ball_row import respond
-from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
 from thermospindle.model.files.stiffness_table import BETWEEN, BY_DIRECTION, COLUMNS, read_table, write_table
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.bearing_numbers import Numbers
 from thermospindle.model.scene.reading import build, load
 from thermospindle.model.units import RPM
-from thermospindle.sim.operating import operating_point, stiffness_table
+from thermospindle.sim.operating import operating_point, stiffness_table, unloads
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +190,23 @@ def test_says_on_which_side_a_bearing_is_loose(spindle):
     assert stiffness_table(spindle, [20.0, 60.0]).loose("upper") == ""
     force = {"contact_force_N": np.array([[0.0], [3.0]])}
     assert replace(none, values={"upper": force}).loose("upper") == "below"
+
+
+def test_a_state_that_is_not_found_for_another_reason_is_no_contact_lost(monkeypatch):
+    """A bearing that loses contact at 57 C, and states of 31 to 33 C that no search finds: 31 C was told."""
+
+    def point(_, condition, *rest):
+        if 31 < condition.temperature < 33:
+            raise NoEquilibrium("ball centres did not settle")
+        pressed = 1e-9 * (57 - condition.temperature) ** 3
+        return SimpleNamespace(condition=condition, state=SimpleNamespace(bearing=lambda name: SimpleNamespace(in_contact=pressed > 0, deformation=pressed)))
+
+    ends = [point(None, Condition(t)) for t in (4.0, 60.0)]
+    monkeypatch.setattr("thermospindle.sim.operating.operating_point", point)
+    with pytest.raises(NoEquilibrium, match="did not settle"):
+        unloads(None, ends, "upper")
+    ends = [point(None, Condition(t)) for t in (40.0, 60.0)]
+    assert unloads(None, ends, "upper") == pytest.approx(57.0, abs=2e-3)
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "# provenance: {}\n# unloads_C: {}\nbearing,temperature_C\nupper,x\n"])

@@ -13,8 +13,8 @@ from thermospindle.cli import main
 from thermospindle.model.files.stiffness_table import StiffnessTable
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.model.units import RPM, in_rpm
-from thermospindle.report.text.states import show_modes, show_table, show_told_table
+from thermospindle.model.units import RPM, in_rpm, small_length
+from thermospindle.report.text.states import _loose, show_modes, show_table, show_told_table
 from thermospindle.sim.operating import operating_point
 
 
@@ -76,3 +76,25 @@ def test_a_speed_is_told_as_it_was_given(rpm, capsys):
     assert in_rpm(rpm * RPM) == rpm
     assert main(["modes", "hdd_2003", "--speed", str(rpm), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["speed_rpm"] == rpm
+
+
+@pytest.mark.parametrize(("length", "least", "told"), [(2.17e-6, "nm", "2.17 um"), (834e-9, "nm", "834 nm"), (999.6e-9, "nm", "1 um"), (2.5e-3, "nm", "2.5 mm"), (3e-7, "um", "0.3 um"), (1.2e-3, "um", "1.2 mm"), (-4e-9, "nm", "-4 nm")])
+def test_a_small_length_is_told_in_words(length, least, told):
+    """A runout of 2.17 um was "2.17e+03 nm" in its picture."""
+    assert small_length(length, least) == told
+
+
+def test_where_a_bearing_is_loose_is_told_with_its_side_and_its_speed():
+    """Also where it has contact in the middle alone; of a bearing that is loose at all temperatures the lowest was told as where it lets go."""
+
+    def told(*force, where=30.0, speeds=1):
+        temperature = np.array([20.0, 40.0, 60.0])
+        values = {"rear": {"contact_force_N": np.repeat(np.array(force, float)[:, None], speeds, axis=1)}}
+        return _loose(StiffnessTable(temperature, np.arange(speeds) * 100 * RPM, values, {"rear": where}, {}), "rear")
+
+    assert told(3, 0, 0) == "rear bearing loses contact at 30.00 C"
+    assert told(3, 0, 3, speeds=2) == "rear bearing loses contact at 30.00 C at 0 rpm; at 60 C it has it again"
+    assert told(0, 3, 3) == "rear bearing has no contact below 30.00 C"
+    assert told(0, 3, 0) == "rear bearing has no contact below 30.00 C; at 60 C it has none either"
+    assert told(0, 0, 0, where=20.0, speeds=2) == "rear bearing has no contact at any of 20 to 60 C at 0 rpm; where it has was not asked"
+    assert told(3, 3, 3, where=None) == ""

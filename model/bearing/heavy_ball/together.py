@@ -5,7 +5,7 @@ Structures whose rows are displaced ask for all of them many times; most of an a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any, TypeVar
 
@@ -56,7 +56,7 @@ def at_own_speeds(
         rolled, by_cage = (np.add.reduceat(of, first) / counts for of in (each.speed, each.by_cage))
         step = (rolled - speeds) / (1.0 - by_cage)
         if (np.abs(step) <= STANDING * np.abs(rolled)).all():
-            return [(float(speed), _part(here, slice(a, b)), _part(each, slice(a, b))) for speed, a, b in zip(speeds, first, ends, strict=True)]
+            return [(float(speed), _part(here, a, b), _part(each, a, b)) for speed, a, b in zip(speeds, first, ends, strict=True)]
         speeds = speeds + step
     raise NoEquilibrium("the speed of a cage did not settle")
 
@@ -75,7 +75,7 @@ def of_each(rows: Sequence[HeavyBall], counts: Sequence[int]) -> HeavyBall:
 
 def settled_together(balls: HeavyBall, line: Vector, tolerance: Array, least: Array, start: Vector | None = None) -> Balance:
     """`settled` of many balls (`of_each`), with all that it is given arrays (balls,): by the same steps of all at once from where they were;
-    or else, with halved ones, from where they may be; and by itself each ball that these bring nowhere."""
+    or else, with halved ones, from where they may be; and by itself each ball that these do not bring to rest, or make no better."""
     here = None if start is None else _approached(balls, line, tolerance, least, start, FEW, 1)
     late = np.arange(len(line[0])) if here is None else np.flatnonzero(~(np.hypot(*here.resultant) < tolerance))
     if here is not None and not len(late):
@@ -142,6 +142,11 @@ def _numbers(here: Balance) -> list[Any]:
     return [number for field in here for number in (field if isinstance(field, tuple) else (field,))]
 
 
-def _part(found: Told, own: slice) -> Told:
+def _part(found: Told, first: int, end: int) -> Told:
     """What is said of some of the balls."""
-    return type(found)(*(tuple(x[own] for x in v) if isinstance(v, tuple) else v[own] for v in found))
+    return of_numbers(found, lambda x: x[first:end])
+
+
+def of_numbers(told: Told, function: Callable[[Any], Any]) -> Told:
+    """What is said of balls, with a function of every number, or array, in its place."""
+    return type(told)(*(tuple(map(function, v)) if isinstance(v, tuple) else function(v) for v in told))

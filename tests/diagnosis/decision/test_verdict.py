@@ -71,13 +71,14 @@ def test_a_name_beside_which_something_drifts_is_as_probable_as_it_is_told():
     assert max(c.probability for c in mostly.candidates) < 0.01
 
 
-@pytest.mark.parametrize(("beside", "word"), [(True, "unexplained"), (False, "identified")])
-def test_a_resonance_that_moves_without_effects_alone_stands_in_for_one(beside, word, monkeypatch):
-    """A light resonance gained 300 without effects, and moved there with temperature; an effect gains 100 more. Where the resonance
-    moves beside it too, that is what is unknown; where it does not, the effect is what moved (blind campaign 3344)."""
-    found = replace(made({"a": 100.0}), by_resonances=300.0)
+@pytest.mark.parametrize(("gain", "beside", "word"), [(100.0, 0.1, "unexplained"), (100.0, 0.05, "unexplained"), (100.0, 0.01, "identified"), (8.0, 0.01, "unexplained")])
+def test_a_resonance_that_moves_without_effects_alone_stands_in_for_one(gain, beside, word, monkeypatch):
+    """A light resonance gained 300 without effects, and moved there by a tenth with temperature. Where it moves most of the way beside an effect that gains
+    100 more, that is what is unknown; where it does not, the effect is what moved (blind campaign 3344). Not one that gains next to nothing."""
+    found = replace(made({"a": gain}), by_resonances=300.0)
     resonance = SimpleNamespace(frequency=500.0, drift=(0.1, 0.0), frequency_at=lambda far: 500.0 + 10 * far)
-    monkeypatch.setattr(verdict, "moving", lambda model, h, discount: [resonance] if beside or not h.mechanisms else [])
+    monkeypatch.setattr(verdict, "moving", lambda model, h, discount: [resonance])
+    monkeypatch.setattr(verdict, "travelled", lambda model, h: beside if h.mechanisms else 0.1)
     monkeypatch.setattr(reason, "moving", lambda model, h, *discount: [])
     assert decide(found).word == word
 

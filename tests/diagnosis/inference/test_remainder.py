@@ -17,7 +17,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.remainder import by_frequency, light_resonance
-from thermospindle.diagnosis.inference.resonance import _centred, _resonates, beside, moving, shown, with_resonance
+from thermospindle.diagnosis.inference.resonance import _centred, _resonates, beside, moving, shown, travelled, with_resonance
 from thermospindle.diagnosis.parameters.nuisance import RESONANCE, STIFFNESS_DRIFT, Resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import NoEquilibrium
@@ -212,6 +212,7 @@ def test_one_that_moves_with_temperature_is_found(spindle):
     wider, h = found
     (moves,) = moving(wider, h)
     assert moving(wider, h, discount=1e6) == []
+    assert travelled(wider, h) == pytest.approx(abs(np.ptp([moves.frequency_at(wider.far(t)) for t in range(len(wider.tests))])) / moves.frequency, rel=0.1)
     assert [moves.frequency_at((t - 20.0) / 40.0) for t in (20.0, 60.0)] == pytest.approx([1645.0, 1445.0], rel=3e-3)
     assert h.fit.chi2 / h.fit.count == pytest.approx(1.0, abs=0.15)
     assert h.evidence.ln > none.evidence.ln + 1000
