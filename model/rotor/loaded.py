@@ -69,19 +69,18 @@ def _asked(rows: Sequence[_Row]) -> Callable[[Sequence[Array]], list[RowForce]]:
     """What rows of balls answer at displacements of theirs: sought together, from where the balls were when last asked;
     or, where loose ones lead nowhere from there, from where they were when first asked."""
     balls = [row.row for row in rows if isinstance(row.row, BallRow)]
-    first: list[Rolled | None] = [None] * len(balls)
-    last = first
+    first: list[Rolled | None] = []
+    last: list[Rolled | None] = [None] * len(balls)
 
     def ask(qs: Sequence[Array]) -> list[RowForce]:
-        nonlocal first, last
         try:
             told = ball_row.respond_all(balls, qs, last)
         except NoEquilibrium:
-            if last is first:
+            if not first:
                 raise
             told = ball_row.respond_all(balls, qs, first)
-        last = [own.rolled for own in told]
-        first = last if None in first else first
+        last[:] = [own.rolled for own in told]
+        first[:] = first or last
         return told
 
     return ask
@@ -176,9 +175,8 @@ def _heavy(balls: Sequence[_Row], ask: Callable[[Sequence[Array]], list[RowForce
 
 
 def _at_all_places(row: _Row, q: Array) -> _Row:
-    """The same with its balls at all places of the cage, where these differ at a displacement."""
-    if isinstance(row.row, RollerRow):
-        return row
+    """A row of balls with these at all places of the cage, where they differ at a displacement."""
+    assert isinstance(row.row, BallRow)
     every, places = ball_row.at_all_places(row.row, q)
     return replace(row, row=every, places=places)
 
