@@ -116,17 +116,19 @@ def _approached(balls: HeavyBall, line: Vector, tolerance: Array, least: Array, 
 
 
 def _some(balls: HeavyBall, which: Integers) -> HeavyBall:
-    def own(thing: Any) -> dict[str, Any]:
-        return {f.name: value[which] for f in fields(thing) if isinstance(value := getattr(thing, f.name), np.ndarray)}
-
-    return HeavyBall(**own(balls), inertia=BallInertia(**own(balls.inertia)))
+    return _of_fields(balls, lambda x: x[which])
 
 
 def _one(balls: HeavyBall, k: int) -> HeavyBall:
     """Ball number k by itself, in plain numbers."""
+    return _of_fields(balls, lambda x: float(x[k]))
 
-    def own(thing: Any) -> dict[str, float]:
-        return {f.name: float(value[k]) for f in fields(thing) if isinstance(value := getattr(thing, f.name), np.ndarray)}
+
+def _of_fields(balls: HeavyBall, function: Callable[[Any], Any]) -> HeavyBall:
+    """Balls with a function of every array in its place."""
+
+    def own(thing: Any) -> dict[str, Any]:
+        return {f.name: function(value) for f in fields(thing) if isinstance(value := getattr(thing, f.name), np.ndarray)}
 
     return HeavyBall(**own(balls), inertia=BallInertia(**own(balls.inertia)))
 
