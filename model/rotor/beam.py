@@ -111,12 +111,14 @@ def with_theory(
     bodies, joints = {b.name: b for b in structure.bodies}, {j.name: j for j in structure.joints}
     shafts = tuple(replace(s, shear=told[s.name][0], rotary=told[s.name][1]) for s in structure.shafts)
     for old, new in zip(structure.shafts, shafts, strict=True):
-        for a, b in zip(nodes(old, materials), nodes(new, materials), strict=True):
-            own = bodies[a.name]
-            x, y, z = (i + after - before for i, after, before in zip(own.inertia, b.inertia, a.inertia, strict=True))
-            changed_bodies[a.name] = replace(own, inertia=(x, y, z))
-        for before, after in zip(elements(old, materials, temperature), elements(new, materials, temperature), strict=True):
-            changed_joints[before.name] = _scaled(joints[before.name], before, after)
+        if new.rotary != old.rotary:
+            for a, b in zip(nodes(old, materials), nodes(new, materials), strict=True):
+                own = bodies[a.name]
+                x, y, z = (i + after - before for i, after, before in zip(own.inertia, b.inertia, a.inertia, strict=True))
+                changed_bodies[a.name] = replace(own, inertia=(x, y, z))
+        if new.shear != old.shear:
+            for before, after in zip(elements(old, materials, temperature), elements(new, materials, temperature), strict=True):
+                changed_joints[before.name] = _scaled(joints[before.name], before, after)
     return replace(
         structure,
         bodies=tuple(changed_bodies.get(b.name, b) for b in structure.bodies),
