@@ -8,6 +8,7 @@ forward and a backward circle: z = x + i y = F exp(i w t) + conj(B) exp(-i w t) 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -67,34 +68,44 @@ class FoundLine:
 
 
 def fit(time: Array, value: Array, frequency: Array) -> Fit:
-    """Least squares of a record (probes, n) at time (n,) s on the mean and lines at `frequency` (k,) Hz, by normal equations.
+    """Least squares of a record (probes, n) at evenly spaced time (n,) s on the mean and lines at `frequency` (k,) Hz, by normal equations.
 
-    ValueError when the frequencies are more than the samples can tell. Directions in which the data
-    say nothing (two frequencies almost the same) are left out: the phasors with the smallest norm.
+    About the middle of the record sums of products of cosines and sines are Dirichlet's kernel, and those of one with the other nothing;
+    exp(i w t) is what it is at the start of each piece of sqrt(n) samples times what it is within one. ValueError when the frequencies are
+    more than the samples can tell. Directions in which the data say nothing (two frequencies almost the same) are left out: the phasors
+    with the smallest norm.
     """
     k, n = len(frequency), len(time)
     if 2 * k + 1 > n:
         raise ValueError(f"{k} lines cannot be estimated from {n} samples")
-    middle = (time[0] + time[-1]) / 2
-    pieces = slices(n, 2 * k + 1)
+    step, middle = float(time[-1] - time[0]) / max(n - 1, 1), (time[0] + time[-1]) / 2
+    turns = np.asarray(frequency) * step
+    piece = math.isqrt(n - 1) + 1
+    starts = np.exp(2j * np.pi * np.outer(np.arange(0, n, piece) - (n - 1) / 2, turns))  # (pieces, k)
+    within = np.exp(2j * np.pi * np.outer(np.arange(piece), turns)).view(float).reshape(piece, k, 2)  # cosines and sines
+    cut = np.zeros((len(value), len(starts), piece))
+    cut.reshape(len(value), -1)[:, :n] = value
 
-    def basis(piece: slice) -> Array:
-        turn = 2 * np.pi * np.outer(frequency, time[piece] - middle)
-        return np.vstack([np.cos(turn), -np.sin(turn), np.ones((1, turn.shape[1]))])
+    def summed(turn: Array) -> Array:
+        return n * np.sinc(n * turn) / np.sinc(turn)
 
-    square, projected = np.zeros((2 * k + 1, 2 * k + 1)), np.zeros((2 * k + 1, len(value)))
-    rows = np.zeros((0, 0))
-    for piece in pieces:
-        rows = basis(piece)
-        square += rows @ rows.T
-        projected += rows @ value[:, piece].T
+    apart, both = summed(turns[:, None] - turns), summed(turns[:, None] + turns)
+    cosines = np.block([[(apart + both) / 2, summed(turns)[:, None]], [summed(turns), np.float64(n)]])
+    seen = np.sum((cut @ within.reshape(piece, -1)).view(complex) * starts, axis=1)  # (probes, k)
+    real = _solved(cosines, np.vstack([seen.real.T, value.sum(axis=1)]))
+    phasor = real[:, :k] - 1j * _solved((apart - both) / 2, seen.imag.T)
+    shown = np.ascontiguousarray((phasor[:, None] * starts).conj()).view(float) @ within.reshape(piece, -1).T
+    residual = value - shown.reshape(len(value), -1)[:, :n] - real[:, k:]
+    return Fit(np.asarray(frequency), phasor * np.exp(-2j * np.pi * frequency * middle), real[:, k], residual)
+
+
+def _solved(square: Array, projected: Array) -> Array:
+    """The solution (probes, m) of normal equations (m, m) for a right side (m, probes), without what `square` says nothing of."""
     scale = 1 / np.sqrt(np.diag(square))
     eigen, vectors = np.linalg.eigh(square * np.outer(scale, scale))
-    kept = eigen > CUTOFF * eigen[-1]
-    found = (((vectors[:, kept] / eigen[kept]) @ (vectors[:, kept].T @ (scale[:, None] * projected))) * scale[:, None]).T
-    residual = value - np.hstack([found @ (basis(piece) if len(pieces) > 1 else rows) for piece in pieces])
-    phasor = (found[:, :k] + 1j * found[:, k : 2 * k]) * np.exp(-2j * np.pi * frequency * middle)
-    return Fit(np.asarray(frequency), phasor, found[:, -1], residual)
+    kept = eigen > CUTOFF * eigen.max(initial=0.0)
+    found = (vectors[:, kept] / eigen[kept]) @ (vectors[:, kept].T @ (scale[:, None] * projected))
+    return np.asarray((found * scale[:, None]).T)
 
 
 def slices(samples: int, each: int) -> list[slice]:
