@@ -29,7 +29,7 @@ from thermospindle.model.rotor.distributed import spread
 from thermospindle.model.rotor.frf import frf, point_rows
 from thermospindle.model.rotor.loaded import loaded
 from thermospindle.model.rotor.modes import Mode, modes
-from thermospindle.model.rotor.poles import Between
+from thermospindle.model.rotor.poles import Between, Poles, poles
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.sensors import with_sensors
 from thermospindle.model.types import Array, ComplexArray
@@ -104,6 +104,11 @@ class OperatingPoint:
     def linear(self) -> Matrices:
         """M, C + G, K assembled of the chain, which the MuJoCo model linearises to (`mjcf.linearise`; a rule of every effect)."""
         return matrices(self.chain)
+
+    @cached_property
+    def poles(self) -> Poles:
+        """All poles of `linear` and their vectors."""
+        return poles(self.linear)
 
     @cached_property
     def modes(self) -> list[Mode]:

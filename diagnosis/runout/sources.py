@@ -28,7 +28,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import on_nodes
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.operating import OperatingPoint, operating_point
-from thermospindle.sim.running.excitation import at_speed, chain_response, excitation
+from thermospindle.sim.running.excitation import at_speed, excitation, response
 
 GRADE = GRADES["high precision"]
 ECCENTRIC = 0.1e-6  # m, rms eccentricity of a race where the scene gives none
@@ -98,7 +98,7 @@ def phasors(point: OperatingPoint, imperfections: Imperfections, probes: Sequenc
     rows do between displaced rings is among them."""
     every = excitation(point, imperfections)
     forces = at_speed(every if perfect else every.without(VARYING), 1.0)
-    moved = chain_response(point.chain, forces)
+    moved = response(point, forces)
     rows = np.array([np.array(p.direction) @ motion_rows(point.chain, p.body, p.position)[:3] for p in probes])
     found: dict[Key, ComplexArray] = {}
     for line, one in zip(forces.line, moved, strict=True):

@@ -13,7 +13,6 @@ import numpy as np
 
 from thermospindle.model.rotor.frf import frf, point_rows
 from thermospindle.model.rotor.modes import Mode
-from thermospindle.model.rotor.poles import poles
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import HERTZ
@@ -32,7 +31,7 @@ ONE = 1e-6
 def peaks(point: OperatingPoint, modes: Sequence[Mode]) -> Array:
     """Height (m,) of every mode's own term at its resonance, (m/s)/N, in the driving point's mobility that shows it best."""
     struck = point_rows(point.spindle, point.chain, point.spindle.hammer.hammer_nodes)
-    found = poles(point.linear)
+    found = point.poles
     residue = np.abs((struck @ found.right) * (found.left @ struck.T).T * found.value).max(axis=0) / np.abs(found.value.real)
     return np.array([residue[np.argmin(np.abs(found.value - m.pole))] for m in modes])
 
@@ -46,7 +45,7 @@ def unseen(point: OperatingPoint, band: tuple[float, float], widths: float = 2.0
     within, m = [mode for mode in point.modes if band[0] <= mode.frequency <= band[1]], point.measurement
     if not within:
         return []
-    found, at = poles(point.linear), np.array([mode.damped_frequency() for mode in within])
+    found, at = point.poles, np.array([mode.damped_frequency() for mode in within])
     residues = np.einsum("rk,kh->rhk", m.response_rows @ found.right, found.left @ m.reference_rows.T)
     whole = np.abs(frf(point.linear, m.response_rows, m.reference_rows, at))
     hidden = []

@@ -81,7 +81,7 @@ def runout(ends: tuple[Exact, Exact], share: float, number: int, which: Key, fre
         return 0.0, 0.0
     at = np.array([f + forward * (away[k].frequency - f) if (k := key(line)) in away else f for line, f in zip(lines, near.forces.frequency, strict=True)])
     at[[key(line) == which for line in lines]] = frequency
-    p = near.poles
+    p = near.point.poles
     value = p.value.copy()
     own = int(np.argmin(np.abs(value - near.modes[number].pole)))
     moved = 2 * np.pi * frequency / abs(value[own]) * value[own]

@@ -9,7 +9,7 @@ import numpy as np
 from thermospindle.model.carrier import turning_parts, unbalance_carrier
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.rotor.modes import Mode
-from thermospindle.model.rotor.poles import Poles, poles
+from thermospindle.model.rotor.poles import Poles
 from thermospindle.model.types import Array
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.resonance.point import UNIT_UNBALANCE, orbit
@@ -54,7 +54,7 @@ def criticals(point: OperatingPoint, near: float) -> list[Critical]:
     ]
     if not met:
         return []
-    p = poles(point.linear)
+    p = point.poles
     return [found for each in met if (found := _driven(point, p, *each)) is not None]
 
 

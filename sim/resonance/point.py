@@ -12,9 +12,7 @@ from thermospindle.model.bearing.kinematics import SIDEBANDS, Line
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.carrier import named, unbalanced
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import Mode
-from thermospindle.model.rotor.poles import Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Harmonics, harmonics, response
@@ -61,18 +59,13 @@ class Exact:
         return np.array([p.row(self.point.chain) for p in hub_probes(self.point.spindle)])
 
     @cached_property
-    def poles(self) -> Poles:
-        """Of the assembled chain."""
-        return poles(matrices(self.point.chain))
-
-    @cached_property
     def modal_forces(self) -> ComplexArray:
         """What every line does to every mode, (lines, 2 dofs)."""
-        return np.asarray(self.forces.force @ self.poles.left.T, complex)
+        return np.asarray(self.forces.force @ self.point.poles.left.T, complex)
 
     def amplitudes(self, number: int, which: Key, resonant: bool = False) -> tuple[float, float, float]:
         """Sense, strength and unit strength (m) of a line on a mode at this condition, with `resonant` as if the line stood on the mode."""
-        p = self.poles
+        p = self.point.poles
         at = int(np.argmin(np.abs(p.value - self.modes[number].pole)))
         axial = which[3] == "axial"
         values = []
@@ -128,7 +121,7 @@ def line_amplitudes(found: Exact) -> dict[Key, float]:
     forces = found.forces
     if not forces.line:
         return {}
-    at_probes = response(found.point, forces, lambda: found.poles) @ found.probes.T
+    at_probes = response(found.point, forces) @ found.probes.T
     return {key(line): _size(one, line.direction == "axial") for line, one in zip(forces.line, at_probes, strict=True)}
 
 
@@ -141,7 +134,7 @@ def nrro_rms(found: Exact) -> tuple[float, float]:
     forces, turning = found.forces, abs(found.point.condition.speed * speed_ratio(found.point.spindle)) / (2 * np.pi)
     if not forces.line or turning == 0.0:
         return 0.0, 0.0
-    at_probes = response(found.point, forces, lambda: found.poles) @ found.probes.T
+    at_probes = response(found.point, forces) @ found.probes.T
     return rms_of_lines(forces.line, forces.frequency, turning, at_probes)
 
 

@@ -31,7 +31,7 @@ import numpy as np
 from thermospindle.model.bearing.kinematics import SMALLEST, Line, cage_line, row_kinematics, unbalance_line
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.carrier import unbalance_carrier
-from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows
+from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices, motion_rows
 from thermospindle.model.rotor.poles import LARGE, Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
@@ -82,20 +82,23 @@ def at_speed(found: Excitation, ratio: float) -> Harmonics:
     return Harmonics(found.line, frequency, force)
 
 
-def response(point: OperatingPoint, forces: Harmonics, known: Callable[[], Poles] | None = None) -> ComplexArray:
-    """Displacement phasors (n, dofs) of the chain under the forces, by the exact linear model at
-    the point's speed, whose poles may be `known`.
+def response(point: OperatingPoint, forces: Harmonics) -> ComplexArray:
+    """Displacement phasors (n, dofs) of the chain under the forces, by the exact linear model at the point's speed.
 
     q(t) = Re(sum of response exp(2 pi i frequency t)).
     """
-    return chain_response(point.chain, forces, known)
+    return _moved(point.linear, lambda: point.poles, forces)
 
 
-def chain_response(chain: RotorBase, forces: Harmonics, known: Callable[[], Poles] | None = None) -> ComplexArray:
+def chain_response(chain: RotorBase, forces: Harmonics) -> ComplexArray:
     """As `response`, of a chain."""
     linear = matrices(chain)
+    return _moved(linear, lambda: poles(linear), forces)
+
+
+def _moved(linear: Matrices, known: Callable[[], Poles], forces: Harmonics) -> ComplexArray:
     if len(linear.mass) > LARGE:  # one eigenproblem for all lines
-        p = known() if known else poles(linear)
+        p = known()
         modal = forces.force @ p.left.T / (2j * np.pi * forces.frequency[:, None] - p.value)
         return np.asarray(modal @ p.right.T)
     omega = 2 * np.pi * forces.frequency[:, None, None]
