@@ -58,13 +58,13 @@ def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.
     whole = strain.sum(axis=0)
     strain = strain / np.where(whole > 0, whole, 1.0)  # none of a part that hangs free, but for rounding
     names = [e.name for e in chain.elements]
-    kind = kinds(linear, shapes)
+    kind, whirl = kinds(linear, shapes), _whirls(chain, shapes)
     return [
         Mode(
             frequency=float(abs(p) / (2 * np.pi)),
             damping_ratio=float(-p.real / abs(p)),
             kind=kind[m],
-            whirl="none" if kind[m] == "axial" else _whirl(chain, shapes[:, m]),
+            whirl="none" if kind[m] == "axial" else whirl[m],
             energy=dict(zip(names, strain[:, m].tolist(), strict=True)),
             shape=shapes[:, m],
             pole=complex(p),
@@ -86,8 +86,8 @@ def kinds(linear: Matrices, shapes: ComplexArray) -> tuple[str, ...]:
     return tuple("axial" if a else "rocking" if r else "lateral" for a, r in zip(axial, rocking, strict=True))
 
 
-def _whirl(chain: RotorBase, shape: ComplexArray) -> str:
-    """Sense in which the axis of what turns circulates: y a quarter period behind x is forward for +z speed.
+def _whirls(chain: RotorBase, shapes: ComplexArray) -> list[str]:
+    """Sense in which the axis of what turns circulates in every shape (n, m): y a quarter period behind x is forward for +z speed.
 
     Asked at the two places of every turning body, its radius of gyration below and above its centre, that have its inertia. Of an orbit 2 Im(x y*) is its area over pi / 2, and
     |x|^2 + |y|^2 where it is a circle. None, where the largest area has less than `LINE` of the largest motion. On supports that differ in x and y one place may
@@ -96,15 +96,13 @@ def _whirl(chain: RotorBase, shape: ComplexArray) -> str:
     """
     ends = [(b.name, b.z + side * np.sqrt((b.inertia[0] + b.inertia[1]) / (2 * b.mass))) for b in chain.bodies if b.turns for side in (-1.0, 1.0)]
     if not ends:
-        return "none"
-    x, y = np.array([motion_rows(chain, name, (0.0, 0.0, float(z)))[:2] @ shape for name, z in ends]).T
+        return ["none"] * shapes.shape[1]
+    x, y = (np.array(rows) @ shapes for rows in zip(*(motion_rows(chain, name, (0.0, 0.0, float(z)))[:2] for name, z in ends), strict=True))
     area = 2 * np.imag(x * y.conj()) * np.sign(chain.speed)
-    forward, backward = max(float(area.max()), 0.0), max(-float(area.min()), 0.0)
-    if max(forward, backward) <= LINE * float(np.max(np.abs(x) ** 2 + np.abs(y) ** 2)):
-        return "none"
-    if min(forward, backward) > LESSER * max(forward, backward):
-        return "mixed"
-    return "forward" if forward > backward else "backward"
+    forward, backward = np.maximum(area.max(axis=0), 0.0), np.maximum(-area.min(axis=0), 0.0)
+    line = np.maximum(forward, backward) <= LINE * np.max(np.abs(x) ** 2 + np.abs(y) ** 2, axis=0)
+    mixed = np.minimum(forward, backward) > LESSER * np.maximum(forward, backward)
+    return np.select([line, mixed, forward > backward], ["none", "mixed", "forward"], "backward").tolist()
 
 
 def group_energy(chain: RotorBase, mode: Mode) -> dict[str, float]:
