@@ -146,7 +146,7 @@ def test_warm_up_tells_whose_preload_and_watts(capsys: pytest.CaptureFixture[str
     assert " mW" not in said
 
 
-@pytest.mark.parametrize("rpm", [8000, 12000])
+@pytest.mark.parametrize("rpm", [pytest.param(8000, marks=pytest.mark.slow), 12000])
 def test_five_bearings_warm_up_to_a_steady_state(rpm: int, capsys: pytest.CaptureFixture[str]) -> None:
     """Since friction goes by Harris' load, rigid preloads ran away at the scene's own speed, and only a slow test would have told."""
     assert main(["warmup", FIVE, "--speed", str(rpm), "--minutes", "0.05", "--json"]) == 0

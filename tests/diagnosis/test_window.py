@@ -83,8 +83,15 @@ def test_errors_of_compressed_lines_come_true(hidden):
 
 @pytest.mark.parametrize(
     ("hidden", "before", "told", "without"),
-    [(0.0, 0.0, None, 0.9), (DAMPED, 0.0, None, 1.5), (DAMPED, 0.0, 0.0, 1.5), (DAMPED, 0.02, None, 1.5), (DAMPED, 0.04, None, 1.0), (DAMPED, 0.04, 0.04, 1.0), (DAMPED, 0.0425, 0.04, 1.0)],
-    ids=["new in every line", "hit at the start, untold", "hit at the start", "hit a little later, untold", "hit later, untold", "hit later", "hit a little later than told"],
+    [
+        pytest.param(0.0, 0.0, None, 0.9, id="new in every line"),
+        pytest.param(DAMPED, 0.0, None, 1.5, id="hit at the start, untold", marks=pytest.mark.slow),
+        pytest.param(DAMPED, 0.0, 0.0, 1.5, id="hit at the start"),
+        pytest.param(DAMPED, 0.02, None, 1.5, id="hit a little later, untold", marks=pytest.mark.slow),
+        pytest.param(DAMPED, 0.04, None, 1.0, id="hit later, untold"),
+        pytest.param(DAMPED, 0.04, 0.04, 1.0, id="hit later", marks=pytest.mark.slow),
+        pytest.param(DAMPED, 0.0425, 0.04, 1.0, id="hit a little later than told"),
+    ],
 )
 def test_errors_of_what_is_smooth_over_lines_come_true(hidden, before, told, without):
     """A gain, a delay and a mode's frequency fitted to windowed noise are off by their stated errors, within a fifth, where

@@ -88,7 +88,7 @@ class Browser:
     def model(self, name: str) -> str:
         return f"Bokeh.documents[0].get_model_by_name({json.dumps(name)})"
 
-    def wait(self, expression: str, seconds: float = 20) -> Any:
+    def wait(self, expression: str, seconds: float = 60) -> Any:
         """The first true value of an expression."""
         return until(lambda: self.run(expression), seconds, lambda: f"{expression} is still {self.run(expression)!r}; {self.errors}")
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
+import pytest
 from matplotlib import rc_context
 
 from tests.conftest import SCENE
@@ -97,7 +98,7 @@ def test_sections_have_the_form_of_the_report(compared):
     assert all("<svg" in body for _, body in told)
 
 
-def test_the_page_tells_the_error_before_and_after(compared, tmp_path):
+def test_the_page_tells_the_error_before_and_after(compared):
     """It was in the terminal and in the JSON alone."""
     cold, hot = compared.tests
     worse = replace(compared, spindle="<old>", tests=(replace(cold, residuals=10 * cold.residuals), hot))
@@ -110,6 +111,10 @@ def test_the_page_tells_the_error_before_and_after(compared, tmp_path):
     assert "&lt;old&gt;" in text
     assert "before-after" not in sections(compared)[0][1]
     assert len(re.findall(" tests</td>", sections(compared, BeforeAfter(worse, compared, ()))[0][1])) == 1  # none is held out: all are fitted
+
+
+@pytest.mark.slow
+def test_the_page_of_the_verb_tells_it_too(tmp_path):
     out = tmp_path / "out"
     assert main(["compare", str(SCENE), str(SCENE / "measured" / "jang_2003"), "--before", str(SCENE), "--out", str(out), "--json"]) == 0
     assert "rms in standard errors, before and after" in (out / "report.html").read_text()

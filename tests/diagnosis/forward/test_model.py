@@ -59,11 +59,12 @@ def windowed(data):
 def test_derivatives_of_lines_whose_errors_go_together(scene):
     model, x = made(scene)
     model = replace(model, tests=tuple(windowed(d) for d in model.tests))
+    plain = replace(model, tests=tuple(replace(d, alike=None) for d in model.tests))
+    rates = [rates_of(m, x, [[], []]) for m in (model, plain)]
     for t, data in enumerate(model.tests):
-        r, by = nuisance_jacobian(model, t, x, [], rates_of(model, x, [[], []]))
+        r, by = nuisance_jacobian(model, t, x, [], rates[0])
         assert r == pytest.approx(model.residual(t, x, []))
-        plain = replace(model, tests=tuple(replace(d, alike=None) for d in model.tests))
-        assert data.alone(by.rows) * np.sqrt(data.smooth) == pytest.approx(nuisance_jacobian(plain, t, x, [], rates_of(plain, x, [[], []]))[1].rows, rel=1e-6, abs=1e-6)
+        assert data.alone(by.rows) * np.sqrt(data.smooth) == pytest.approx(nuisance_jacobian(plain, t, x, [], rates[1])[1].rows, rel=1e-6, abs=1e-6)
         expected = differences(model, t, x, by.numbers).T
         assert np.linalg.norm(by.whole - expected, axis=1) == pytest.approx(np.zeros(len(by.numbers)), abs=5e-3 * np.linalg.norm(expected, axis=1).max())
 

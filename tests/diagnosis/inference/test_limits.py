@@ -145,7 +145,7 @@ def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike,
     assert impossible(m, np.full(count, low - 0.01), -1e-18 * np.eye(count))  # rounding of what is known
 
 
-@pytest.mark.parametrize("count", [1, 5, 12, 20])
+@pytest.mark.parametrize("count", [1, 5, pytest.param(12, marks=pytest.mark.slow), pytest.param(20, marks=pytest.mark.slow)])
 def test_a_size_at_its_limit_is_said_to_be_beyond_it_as_seldom_with_many_tests_as_with_one(count):
     """Sums of squares beyond a limit grow with the number of tests: against those of one a truth at
     the limit was impossible in half of all campaigns of twenty."""

@@ -235,7 +235,7 @@ def test_below_all_modes_there_is_no_resonance_and_a_verdict(spindle):
     assert model.reference.seen == 0
     alone = fit(model)
     assert light_resonance(model, alone, evidence(model, alone).learned) is None
-    assert diagnose(spindle, quiet).verdict.word == "none"
+    assert diagnose(spindle, quiet, (effect("soak_lag"), effect("preload_loss"))).verdict.word == "none"
 
 
 @pytest.mark.parametrize("settles", [True, False])

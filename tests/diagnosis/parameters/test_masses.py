@@ -114,7 +114,7 @@ def test_a_shaft_that_is_heavier_towards_its_end_weighs_as_much():
     assert len(mass_terms(load(ROOT / "scenes" / "five_bearing"))) == 7
 
 
-@pytest.mark.parametrize("which", ["polar inertia of the hub", "mass and inertia of the shaft"])
+@pytest.mark.parametrize("which", [pytest.param("polar inertia of the hub", marks=pytest.mark.slow), "mass and inertia of the shaft"])
 def test_masses_that_are_off_are_no_disk_and_no_sensors(spindle, which):
     """A newcomer's simulator with nothing hidden, every mass and inertia off by some thousandths:
     `added_disk` or `sensor_mass` for the polar inertia of its hub alone, 30 in ln evidence."""

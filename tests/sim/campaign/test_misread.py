@@ -47,7 +47,7 @@ def test_exchanged_columns_are_said(quantity, spindle):
     assert likenesses(spindle, exchanged) == ["all FRFs fit those that hdd_2003 has with their real and imaginary parts exchanged: is one column told as the other?"]
 
 
-@pytest.mark.parametrize("times", [0.5, 2.0])
+@pytest.mark.parametrize("times", [0.5, pytest.param(2.0, marks=pytest.mark.slow)])
 def test_nothing_is_said_of_a_spindle_far_from_its_drawing(times, spindle):
     joints = tuple(replace(j, stiffness=tuple(times * k for k in j.stiffness)) for j in spindle.structure.joints)
     drawn = replace(spindle, structure=replace(spindle.structure, joints=joints))
