@@ -22,7 +22,7 @@ from thermospindle.model.drawing.measuring import Point
 from thermospindle.model.errors import NoEquilibrium, NotConverged, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, small_length
 from thermospindle.sim.effects.effect import called
 
 FAILED = (NoEquilibrium, NotConverged, OutsideRange)
@@ -168,7 +168,7 @@ def _weighed(spindle: Spindle, plan: Plan, parts: Sequence[Family], lead: Explan
     tells = "no line"
     if predicted:
         best = predicted[0]
-        tells = f"the line at {best.frequency:.1f} Hz ({best.name}), {1e9 * best.amplitude[0]:.3g} nm by {names[0]}, {1e9 * best.amplitude[1]:.3g} nm by {names[1]}"
+        tells = f"the line at {best.frequency:.1f} Hz ({best.name}), {small_length(best.amplitude[0])} by {names[0]}, {small_length(best.amplitude[1])} by {names[1]}"
     return NextRunout(plan, names, float(np.exp(min(total, CERTAIN))), tells, tuple(predicted))
 
 

@@ -24,6 +24,7 @@ from thermospindle.diagnosis.runout.lines import Seen, UnexplainedLine, look, ru
 from thermospindle.diagnosis.runout.next_test import CERTAIN, NextRunout, next_runout
 from thermospindle.diagnosis.runout.sources import Sources, sources
 from thermospindle.model.machine import Spindle
+from thermospindle.model.units import small_length
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
@@ -243,7 +244,7 @@ def _verdict(
         )  # fmt: skip
 
     if unexplained:
-        where = ", ".join(f"{g.frequency:.1f} Hz ({g.order:.3f} orders, {1e9 * g.amplitude:.3g} nm)" for g in unexplained[:4])
+        where = ", ".join(f"{g.frequency:.1f} Hz ({g.order:.3f} orders, {small_length(g.amplitude)})" for g in unexplained[:4])
         return answer("unexplained", (), f"The records hold lines that no imperfection has: {where}.")
     rejected = _rejected(chi2, count)
     if first is None or not leading or leading[0].delta_evidence < CLEAR:
