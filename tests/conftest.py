@@ -80,12 +80,12 @@ def hot(spindle):
 
 
 @pytest.fixture(scope="session")
-def run(spindle) -> Run:
+def run(spindle, tmp_path_factory) -> Run:
     """Two short tests and the scene's own measurement."""
     from tests.small_run import small_run
     from thermospindle.sim.run import measured_campaigns
 
-    return small_run(spindle, (20.0, 60.0), measured_campaigns(spindle))
+    return made_once(tmp_path_factory, "run", lambda: small_run(spindle, (20.0, 60.0), measured_campaigns(spindle)))
 
 
 @pytest.fixture(scope="session")

@@ -78,7 +78,8 @@ def test_what_a_belt_does_is_no_imperfection_of_a_spindle_without_one(spindle, q
     assert (d.verdict, d.effects) == ("unexplained", ()), d.reason
 
 
-@pytest.mark.parametrize("newton", [35.0, pytest.param(60.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("newton", [35.0, 60.0])
 def test_where_balls_are_let_go_further_sidebands_are_lines_too(spindle, newton):
     """They were lines that no imperfection has, four and five of them, as far as third and fourth sidebands went."""
     belted = pushed(spindle, newton)

@@ -62,6 +62,7 @@ def test_it_says_that_it_loads_until_the_document_is_there(chromium, served):
     assert (chromium.run(word), chromium.run(body)) == ("none", "visible")
 
 
+@pytest.mark.slow
 def test_dragging_changes_curves_and_errors_while_dragging(tab):
     before = errors_told(tab)
     choose(tab, "add", "preload_loss")
@@ -155,6 +156,7 @@ def test_it_fits_the_window_and_can_be_read_in_light_and_dark(tab):
     tab.scheme("light")
 
 
+@pytest.mark.slow
 def test_the_map_of_errors_has_colours_of_its_own_on_a_dark_page(tab):
     drawn = "window.Bokeh?.documents?.[0]?.get_model_by_name('map')?.renderers"  # a page that is being loaded again has none for a while
     fields = f"{drawn}?.map(r => (r.glyph.fill_color ?? r.glyph.text_color).field).join()"
@@ -208,6 +210,7 @@ def test_the_keyboard_alone_looks_through_the_effects_adds_one_and_undoes_it(tab
     tab.wait(f"{added} === 0")
 
 
+@pytest.mark.slow
 def test_the_section_moves_when_it_is_asked_to(tab):
     corner = f"{tab.model('section')}.renderers[1].data_source.data.z[0][0]"
     first = tab.run(corner)

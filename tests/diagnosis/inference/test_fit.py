@@ -263,6 +263,7 @@ def test_peaks_that_move_by_many_widths_are_followed(spindle, compliance, scanne
     assert evidence(model, done).sizes[0] == pytest.approx([compliance, compliance], abs=0.1 * compliance)
 
 
+@pytest.mark.slow
 def test_a_part_of_its_own_may_go_and_come(spindle):
     """A hub whose rim tilts by itself has two degrees of freedom more, and none where its web is
     stiff: fits from one side of that and from the other end at one cost. The derivatives of the one

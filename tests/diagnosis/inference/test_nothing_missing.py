@@ -24,6 +24,7 @@ from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, 
 TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_drawn_alike_all_around_is_not_built_so(spindle):
     """Another's campaign with nothing hidden: the flange 1 % stiffer against one tilt and 1.5 %
     less against the other, in every test. Told as an element that drifts, at 158 in ln evidence."""
@@ -55,6 +56,7 @@ def test_hammers_that_tell_the_force_otherwise_in_each_test_are_no_missing_effec
     assert found.base.fit.chi2 / found.base.fit.count == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_hammers_whose_calibration_is_off_are_no_missing_effect(spindle):
     """Two hammers that read 6 and 5 % too little force in every test, and nothing hidden: blind campaign 2037 was `sensor_gain` for that."""
     campaign = virtual_campaign(spindle, TESTS, 5, [], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 16.0))

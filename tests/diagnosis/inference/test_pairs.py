@@ -74,6 +74,7 @@ def test_two_constant_causes_are_both_named(spindle, tests):
     assert sizes["mount_compliance"] == pytest.approx(0.3, abs=0.03)
 
 
+@pytest.mark.slow
 def test_what_came_first_is_tried_without(spindle):
     """A bond that softens and a weaker preload, and a third mechanism that came before the preload:
     of the rest, which nobody fitted, each two are, and those that are known are not again."""

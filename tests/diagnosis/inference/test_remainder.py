@@ -70,6 +70,7 @@ def test_it_is_found_where_it_is(model):
     assert shown(wider, replace(h, evidence=replace(h.evidence, mean=mean))) == []  # an explanation without it
 
 
+@pytest.mark.slow
 def test_a_fit_that_has_not_arrived_shows_no_resonance(model, monkeypatch):
     """Blind campaign 3420: a channel late by 15 us; with a resonance for it the quadratic promised a chi2 of -24 a number, next to which no effect gained anything."""
     first = fit(model)

@@ -225,6 +225,7 @@ def test_ways_are_asked_of_what_is_needed(spindle, monkeypatch):
         assert len(asked) == ways
 
 
+@pytest.mark.slow
 def test_a_law_of_the_datas_own_is_asked_for_each_law_that_its_effect_has(spindle):
     """A preload lost by temperature alone. Of a machine-tool spindle a law of the data's own was fitted
     better than the one that screening chose, and the right one was never asked: 87 % where it has 99.7 %."""
@@ -326,6 +327,7 @@ def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_do
             assert _without_what_does_nothing(model, none, [h]) is none
 
 
+@pytest.mark.slow
 def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
     """The turning part is warmer by a law of temperature, at rest too, where no friction heats it. Its
     formula's law explains little of that; a law of the data's own all, and reads it off: nothing at 20

@@ -77,6 +77,7 @@ def test_no_test_that_was_made_is_proposed(one_test):
     assert not any(same(t.condition, TESTED) for t in proposed)
 
 
+@pytest.mark.slow
 def test_a_test_beyond_what_the_spindle_is_meant_for_only_where_none_within_decides(one_test, monkeypatch):
     """A rig that is meant for 20 to 60 C and 7200 rpm was sent to 80 C and 10,800 rpm where 60 C at rest told as surely."""
     model, found = one_test

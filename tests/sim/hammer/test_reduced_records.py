@@ -62,6 +62,7 @@ def test_a_beam_too_stiff_to_step():
     assert identify(test).frequency == pytest.approx(wanted, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_verbs_say_that_the_reduced_model_was_taken(tmp_path):
     """`impact`, `run` and `simulate` of a beam too stiff to step, asked for no element, end well and say so; asked for it, they need not."""
     beam = ROOT / "scenes" / "free_shaft"

@@ -18,7 +18,7 @@ def exact(s):
     return np.einsum("mr,mn->rn", SHAPES, answer)[:, None]
 
 
-@pytest.mark.parametrize("end", [1.0, 0.05, 0.01])
+@pytest.mark.parametrize("end", [1.0, pytest.param(0.05, marks=pytest.mark.slow), 0.01])
 def test_errors_come_true_under_a_window_and_noise_makes_no_modes(end):
     """White noise in time, under the window; its level in the FRFs given exactly. Taken for independent from line to
     line, errors were two to three times too small, and every second draw of the shortest window had modes that are none."""

@@ -20,6 +20,7 @@ from thermospindle.sim.resonance.map import resonance_map
 SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"
 
 
+@pytest.mark.slow
 def test_one_temperature_makes_a_campbell_diagram(tmp_path, capsys):
     """With the numbers of a map over several, and without the pictures over temperature; it was refused."""
     asked = ["map", str(SCENE), "--speeds", "3600", "7200", "--json", "--temperatures", "20"]

@@ -68,6 +68,7 @@ def test_moving_balls_do_what_the_lines_say(spindle, newton, within):
     assert np.abs(without - linear).max() > 3 * within * np.abs(linear).max()  # and not what they say of centred rings
 
 
+@pytest.mark.slow
 def test_where_balls_are_let_go_lines_are_off_by_what_the_changing_stiffness_does(spindle):
     """Under 60 N, where that of the lower row changes by 7 %: across by 9 % rms, along the axis, whose mode it drives, by a
     fifth, whatever the size of the imperfections."""
@@ -272,6 +273,7 @@ def test_runout_tells_where_stiffness_changes(lying, tmp_path, capsys):
     assert "Stiffness across changes as balls pass the load: lower" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_a_map_has_the_sidebands(lying):
     spindle = load(lying)
     found = resonance_map(spindle, [20.0, 30.0], np.linspace(0, 14400 * RPM, 9).tolist(), Condition(20.0, SPIN))
