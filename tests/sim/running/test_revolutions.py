@@ -152,6 +152,21 @@ def test_noise_makes_no_lines():
     assert best.residual.std() == pytest.approx(0.3, rel=0.02)
 
 
+@pytest.mark.parametrize("n", [17, 1000, 1024])
+def test_phasors_and_what_they_leave_are_least_squares(n):
+    """Against NumPy's of cosines, sines and a mean, in a record that begins late, of a length that is a square and of one that is none."""
+    random = np.random.default_rng(n)
+    time, frequency = 0.7 + np.arange(n) / 5e3, np.sort(random.uniform(20.0, 2200.0, min(n // 4, 60)))
+    value = random.standard_normal((3, n)) + 5.0
+    turn = 2 * np.pi * np.outer(time, frequency)
+    basis = np.hstack([np.cos(turn), -np.sin(turn), np.ones((n, 1))])
+    expected = np.linalg.lstsq(basis, value.T)[0]
+    found, k = fit(time, value, frequency), len(frequency)
+    assert found.mean == pytest.approx(expected[-1], rel=1e-9)
+    assert found.phasor == pytest.approx((expected[:k] + 1j * expected[k : 2 * k]).T, abs=1e-9 * np.abs(expected).max())
+    assert found.residual == pytest.approx((value.T - basis @ expected).T, abs=1e-9 * np.abs(expected).max())
+
+
 def test_more_lines_than_samples_and_too_slow_a_record_are_refused():
     time = times(1)
     with pytest.raises(ValueError, match="cannot be estimated"):
