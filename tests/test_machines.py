@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import ROOT
+from tests.conftest import ROOT, coarse_warmups
 from thermospindle.cli import main
 from thermospindle.model.errors import BadInput
 from thermospindle.sim.running.run import tilted_inertia
@@ -149,7 +149,8 @@ def test_warm_up_tells_whose_preload_and_watts(capsys: pytest.CaptureFixture[str
 @pytest.mark.parametrize("rpm", [pytest.param(8000, marks=pytest.mark.slow), 12000])
 def test_five_bearings_warm_up_to_a_steady_state(rpm: int, capsys: pytest.CaptureFixture[str]) -> None:
     """Since friction goes by Harris' load, rigid preloads ran away at the scene's own speed, and only a slow test would have told."""
-    assert main(["warmup", FIVE, "--speed", str(rpm), "--minutes", "0.05", "--json"]) == 0
+    with coarse_warmups():
+        assert main(["warmup", FIVE, "--speed", str(rpm), "--minutes", "0.05", "--json"]) == 0
     steady = json.loads(capsys.readouterr().out)["steady"]
     assert steady["load_feedback"] < 0.8
     ring = steady["temperature_C"]

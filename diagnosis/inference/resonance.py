@@ -112,6 +112,8 @@ def shown(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
 
 def moving(model: CampaignModel, h: Hypothesis, discount: float = 1.0) -> list[Resonance]:
     """Those whose frequency is surely another at another temperature, where ln evidence counts by a `discount` less."""
+    if not (needed := _needed(model, h)):
+        return []
     by_drift = _apart(model)
 
     def moves(r: Resonance, covariance: Array) -> bool:
@@ -119,13 +121,13 @@ def moving(model: CampaignModel, h: Hypothesis, discount: float = 1.0) -> list[R
         sd = np.sqrt(np.einsum("abi,ij,abj->ab", by_drift, covariance, by_drift))
         return bool(np.any(np.abs(change) > np.maximum(MOVES, SURELY * np.sqrt(discount) * sd)))
 
-    return [r for r, covariance in _needed(model, h) if moves(r, covariance)]
+    return [r for r, covariance in needed if moves(r, covariance)]
 
 
 def travelled(model: CampaignModel, h: Hypothesis) -> float:
     """How far the light resonance that an explanation needs, and that moves most, moves over the tests, of its frequency; nothing of none."""
-    by_drift = _apart(model)
-    return max((float(np.abs(by_drift @ np.array(r.drift)).max()) for r, _ in _needed(model, h)), default=0.0)
+    drifts = [np.array(r.drift) for r, _ in _needed(model, h)]
+    return float(np.abs(_apart(model) @ np.transpose(drifts)).max()) if drifts else 0.0
 
 
 def _apart(model: CampaignModel) -> Array:

@@ -92,6 +92,7 @@ def test_a_damper_and_a_complex_stiffness_lose_as_much_at_one_frequency(scene):
     assert apart[1] > 1e-4
 
 
+@pytest.mark.slow
 def test_what_honest_programs_do_otherwise_is_in_later_worlds():
     """Channels that are late, balls on orbits of their own at speed alone, losses of a complex
     stiffness where lines are not from records in time; all among what may stand in."""
@@ -137,6 +138,7 @@ def test_hammers_of_later_worlds_have_gains_of_their_own():
     assert drawn.made().world.hammer_gain == 0.0
 
 
+@pytest.mark.slow
 def test_sensors_of_later_worlds_are_glued_by_hand():
     """The same in all tests, each channel by itself; of seeds from before to the last bit where
     they are drawn. Both are among what may stand in, where a world has them."""
@@ -157,6 +159,7 @@ def test_sensors_of_later_worlds_are_glued_by_hand():
         assert of.beside(aside[:, None]).whole < 0.1 * np.linalg.norm(aside)
 
 
+@pytest.mark.slow
 def test_of_two_that_do_the_same_neither_shows_beside_the_other():
     """And one that does something else shows nearly as well as alone. What hammers are off by is
     among what may stand in, where a world has it."""

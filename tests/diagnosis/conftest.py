@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import pytest
 
+from tests.conftest import ROOT
 from tests.diagnosis.exact_campaign import exact
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import observe
+from thermospindle.model.scene.reading import load
 
 
 @pytest.fixture(scope="session")
@@ -26,3 +28,12 @@ def clean(spindle):
 @pytest.fixture(scope="session")
 def itself(spindle, clean):
     return compare(spindle, *clean)
+
+
+@pytest.fixture(scope="session")
+def coarse(tmp_path_factory):
+    """The scene `free_shaft` with a coarser mesh: its four frequencies move by 1e-4."""
+    folder = tmp_path_factory.mktemp("free_shaft")
+    text = (ROOT / "scenes" / "free_shaft" / "spindle.toml").read_text(encoding="utf-8")
+    (folder / "spindle.toml").write_text(text.replace("longest_element_mm = 25.0", "longest_element_mm = 65.0"), encoding="utf-8")
+    return load(folder)

@@ -21,11 +21,10 @@ from thermospindle.sim.effects import by_name
 
 
 @pytest.fixture(scope="module")
-def shaft():
+def shaft(coarse):
     """A ladder of a measured shaft that hangs free, without bearings, of four modes of one test: the plainest beam, and what it leaves out."""
-    scene = load(ROOT / "scenes" / "free_shaft")
     chosen = [by_name(name) for name in BEAM]
-    return ladder(scene, read_campaign(ROOT / "scenes" / "free_shaft" / "measured" / "modelab"), chosen)
+    return ladder(coarse, read_campaign(ROOT / "scenes" / "free_shaft" / "measured" / "modelab"), chosen)
 
 
 def test_what_says_nothing_is_left_out(shaft):

@@ -9,22 +9,12 @@ import thermospindle as ts
 from tests.conftest import ROOT
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.verdict import diagnose
-from thermospindle.model.scene.reading import load
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.effects import by_name
 
 SCENE = ROOT / "scenes" / "free_shaft"
 CATALOGUE = tuple(by_name(name) for name in ("shear", "rotary_inertia", "sensor_mass", "window_damping"))
-
-
-@pytest.fixture(scope="module")
-def coarse(tmp_path_factory):
-    """The shipped scene with a coarser mesh: its four frequencies move by 1e-4."""
-    folder = tmp_path_factory.mktemp("free_shaft")
-    text = (SCENE / "spindle.toml").read_text(encoding="utf-8")
-    (folder / "spindle.toml").write_text(text.replace("longest_element_mm = 25.0", "longest_element_mm = 65.0"), encoding="utf-8")
-    return load(folder)
 
 
 @pytest.fixture(scope="module")

@@ -62,7 +62,8 @@ def test_nothing_is_named_where_nothing_hides(belted, quiet):
     assert (d.verdict, d.effects) == ("none", ()), d.reason
 
 
-@pytest.mark.parametrize("name", ["cage_unbalance", pytest.param("race_waviness", marks=pytest.mark.slow), pytest.param("ball_size", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cage_unbalance", "race_waviness", "ball_size"])
 def test_a_hidden_imperfection_is_named_with_its_size_and_place(belted, name):
     values = HIDDEN[name]
     d = diagnose_runout(belted, hidden(belted, {name: values}, 1))

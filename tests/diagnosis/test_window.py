@@ -88,7 +88,7 @@ def test_errors_of_compressed_lines_come_true(hidden):
         pytest.param(DAMPED, 0.0, None, 1.5, id="hit at the start, untold", marks=pytest.mark.slow),
         pytest.param(DAMPED, 0.0, 0.0, 1.5, id="hit at the start"),
         pytest.param(DAMPED, 0.02, None, 1.5, id="hit a little later, untold", marks=pytest.mark.slow),
-        pytest.param(DAMPED, 0.04, None, 1.0, id="hit later, untold"),
+        pytest.param(DAMPED, 0.04, None, 1.0, id="hit later, untold", marks=pytest.mark.slow),
         pytest.param(DAMPED, 0.04, 0.04, 1.0, id="hit later", marks=pytest.mark.slow),
         pytest.param(DAMPED, 0.0425, 0.04, 1.0, id="hit a little later than told"),
     ],

@@ -90,6 +90,7 @@ def test_dragging_changes_curves_and_errors_while_dragging(tab):
     until(lambda: errors_told(tab).split("ms for all")[0][:40] == before.split("ms for all")[0][:40], 60)
 
 
+@pytest.mark.slow
 def test_a_test_is_left_out_the_rest_fitted_the_step_kept(tab):
     choose(tab, "add", "preload_loss")
     tab.wait(f"!!{tab.model('preload_loss.loss')}")
