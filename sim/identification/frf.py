@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from itertools import combinations
 from operator import methodcaller
 from pathlib import Path
@@ -58,6 +59,11 @@ class Frf:
         places = [self._place(end, nodes) for end, nodes in zip(ends, (self.response_nodes, self.reference_nodes), strict=True)]
         return np.asarray(self.value[places[0], places[1]])
 
+    @cached_property
+    def _of_speeds(self) -> dict[float, RunningLines]:
+        """What `out_of` found at the speeds (rad/s) that were asked."""
+        return {}
+
     def _place(self, end: int | str, nodes: tuple[int, ...]) -> int:
         for place, node in enumerate(nodes):
             if end in (node, self.names.get(node)):
@@ -108,8 +114,11 @@ def gap(lines: np.ndarray, sweep: bool = True) -> int | None:
 
 
 def out_of(frf: Frf, speed: float) -> RunningLines:
-    """The lines of the running speed (rad/s) that stand in FRFs."""
-    return running_lines(frf.frequency, frf.value, speed)
+    """The lines of the running speed (rad/s) that stand in FRFs; looked for once."""
+    known, speed = frf._of_speeds, abs(speed)
+    if speed not in known:
+        known[speed] = running_lines(frf.frequency, frf.value, speed)
+    return known[speed]
 
 
 def without(frf: Frf, lines: NDArray[np.bool_]) -> Frf:
