@@ -229,11 +229,14 @@ def test_the_verdict_of_one_that_moves_is_that_it_is_unknown(spindle):
     assert re.search(r"a light resonance that the drawing lacks would have to move from 16[45]\d Hz at 20 C to 14[45]\d Hz at 60 C", found.verdict.reason)
 
 
+def below_all_modes(spindle):
+    """A campaign with nothing hidden, of lines below the lowest mode."""
+    return virtual_campaign(spindle, TESTS, 2, errors=drawn(spindle, 3, 2), responses=(1, 3, 6), frequency=np.arange(400.0, 515.0, 4.0))
+
+
 def test_below_all_modes_there_is_no_resonance(spindle):
     """A light one is felt through the modes in the band: where there was none, its products were no table that could be turned."""
-    below = np.arange(400.0, 515.0, 4.0)
-    quiet = virtual_campaign(spindle, TESTS, 2, errors=drawn(spindle, 3, 2), responses=(1, 3, 6), frequency=below)
-    model = model_of(spindle, quiet)
+    model = model_of(spindle, below_all_modes(spindle))
     assert model.reference.seen == 0
     alone = fit(model)
     assert light_resonance(model, alone, evidence(model, alone).learned) is None
@@ -241,9 +244,7 @@ def test_below_all_modes_there_is_no_resonance(spindle):
 
 @pytest.mark.slow
 def test_below_all_modes_nothing_is_missing(spindle):
-    below = np.arange(400.0, 515.0, 4.0)
-    quiet = virtual_campaign(spindle, TESTS, 2, errors=drawn(spindle, 3, 2), responses=(1, 3, 6), frequency=below)
-    assert diagnose(spindle, quiet, (effect("soak_lag"), effect("preload_loss"))).verdict.word == "none"
+    assert diagnose(spindle, below_all_modes(spindle), (effect("soak_lag"), effect("preload_loss"))).verdict.word == "none"
 
 
 @pytest.mark.parametrize("settles", [True, False])
