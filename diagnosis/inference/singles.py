@@ -175,7 +175,7 @@ def lasting(
 ) -> list[Hypothesis]:
     """Effects that are the same in every test beside an explanation, from a scan of sizes with all else as
     drawn: constant discrepancies of the model or strained tolerances stand in for them, and beside those
-    screening sees nothing. Followed to the end is what gains something while errors are still enlarged."""
+    screening sees nothing. Followed to the end is what gains something while errors are still enlarged, and keeps up with the best."""
     n = len(model.parameters)
     if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean) < STRAINED:
         return []
@@ -187,9 +187,9 @@ def lasting(
     if not tasks:
         return []
     about = fit(model, lead.mechanisms, (own, lead.fit.point), tempers=TEMPERS[:-1], learned=steady(expected, lead.mechanisms))
-    least = evidence(model, about).ln + LITTLE
-    gaining = [h for h in fitted(model, tasks, TEMPERS[:-1], about, most, expected, workers) if h.evidence.ln > least]
-    tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in gaining]
+    early = fitted(model, tasks, TEMPERS[:-1], about, most, expected, workers)
+    least = max([evidence(model, about).ln + LITTLE, *(h.evidence.ln - BEHIND for h in early)])
+    tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if h.evidence.ln > least]
     return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers, beaten=lead.fit.cost)
 
 
