@@ -57,7 +57,7 @@ def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: 
 
 
 def total(v: Verdict) -> float:
-    return v.probability_none + sum(c.probability for c in (*v.candidates, *v.free))
+    return v.probability_none + v.probability_unknown + sum(c.probability for c in v.candidates)
 
 
 def by_departing(h: Hypothesis, gained: float) -> Hypothesis:

@@ -8,7 +8,7 @@ beside them, an answer costs more by what it leaves unsaid: half a set by the sm
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from thermospindle.diagnosis.decision.explanations import Candidate, Names, named_part
 
@@ -19,9 +19,22 @@ NEGLIGIBLE = 1e-3  # probability that adds nothing to a set
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or of the misfit that changes, that what is named must reach to be the answer
 
 
+def smallest_set(candidates: Sequence[Candidate], free: Sequence[Candidate]) -> list[Names]:
+    """What the smallest set names that holds the truth with `ENOUGH`, explanation by explanation, where that is in the catalogue."""
+    explained = sorted([*candidates, *(c for c in free if named_part(c))], key=lambda c: -c.probability)
+    enough, held, chosen = ENOUGH * sum(c.probability for c in explained), 0.0, list[Names]()
+    for c in explained:
+        if held >= enough or c.probability < NEGLIGIBLE:
+            break
+        chosen.append(named_part(c))
+        held += c.probability
+    return chosen
+
+
 def least_loss(
-    candidates: Sequence[Candidate], none: float, free: Sequence[Candidate], alike: Mapping[str, frozenset[str]]
+    candidates: Sequence[Candidate], none: float, free: Sequence[Candidate], untried: float, alike: Mapping[str, frozenset[str]], together: Collection[Names]
 ) -> tuple[str, Names, dict[str, float]]:
+    """The answer in a word, what it names, and the expected loss of every answer weighed; of sets that which names explanations `together`."""
     unknown = [c for c in free if all(m.free for m in c.hypothesis.mechanisms)]  # also the model whose every mode drifts
     beside = [c for c in free if not all(m.free for m in c.hypothesis.mechanisms)]  # a named effect and something unknown
     something = 1 - none
@@ -32,7 +45,8 @@ def least_loss(
 
     def missed(own: set[str], at_worst: float) -> float:
         """Of names where something unknown is true: half right where it changes what they change, by another law."""
-        return sum(c.probability * (HALF if any(own & alike.get(n, frozenset()) for n in c.names) else at_worst) for c in unknown)
+        told = sum(c.probability * (HALF if any(own & alike.get(n, frozenset()) for n in c.names) else at_worst) for c in unknown)
+        return told + untried * at_worst
 
     def named_loss(own: set[str]) -> float:
         """Of naming one effect, or two: half right where one of two is named, or one beside
@@ -47,15 +61,9 @@ def least_loss(
     for names in dict.fromkeys([c.names for c in candidates[:8]] + [named_part(c) for c in beside[:3]]):
         key = " + ".join(names)
         losses[key], answers[key] = named_loss(set(names)), ("identified" if len(names) == 1 else "two effects", names)
-    explained = sorted([*candidates, *beside], key=lambda c: -c.probability)
-    enough = ENOUGH * sum(c.probability for c in explained)
-    chosen = list[Candidate]()
-    for c in explained:
-        held = sum(k.probability for k in chosen)
-        if held >= enough or c.probability < NEGLIGIBLE:
-            break
-        chosen.append(c)
-    names = tuple(dict.fromkeys(n for c in chosen for n in named_part(c)))
+    explained = [*candidates, *beside]
+    names = tuple(dict.fromkeys(n for own in together for n in own))
+    chosen = [c for c in explained if named_part(c) in together]
     if len(names) > 1:
         share = sum(c.probability for c in chosen if not c.free or c in mostly)
         little = sum(c.probability for c in chosen if c in mostly)

@@ -98,7 +98,6 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     without, within = (h.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) for h in (found.base, chosen.hypothesis))
     instead = f"; without, the model's frequencies would have to be constantly wrong by about {100 * without:.1g} % of each" if without > 10 * within else ""
     rest = 1 - sum(c.probability for c in told)
-    odds = "all else together is less probable than 1 in 1000" if rest < 1e-3 else f"all else together has a probability of {rest:.1%}"
     word_of = "is the explanation" if len(effects) == 1 else "are both needed" if len(effects) == 2 else "are all needed"
     drifting = [m.name for m in chosen.hypothesis.mechanisms if m.free]
     beside = f"; beside {'it' if len(effects) == 1 else 'them'} {' and '.join(drifting)} drifts a little" if drifting else ""
@@ -108,7 +107,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     before_own = f", {chosen.by_law.evidence.ln - found.base.evidence.ln:.0f} with the law assumed" if chosen.by_law else ""
     whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
     law = f" with a law that is fitted freely{whose}{before_own}" if own else ""
-    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}{disagreement}."
+    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, all else together has a probability of {rest:z.1%}{beside}{instead}{checked}{disagreement}."
 
 
 def _same_in_all(h: Hypothesis) -> bool:

@@ -13,6 +13,7 @@ from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import (
     Candidate,
     Names,
+    astray,
     discount,
     explanations,
     likelier_first,
@@ -20,7 +21,7 @@ from thermospindle.diagnosis.decision.explanations import (
     named_part,
     with_unknown,
 )
-from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
+from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named, smallest_set
 from thermospindle.diagnosis.decision.reason import LEFT, MOVING, UNBUILT, UNTOLD, drifts, unbuilt
 from thermospindle.diagnosis.inference.evidence import left_out
 from thermospindle.diagnosis.inference.hypothesis import PLENTY, Hypothesis
@@ -66,7 +67,9 @@ def decide(found: Search) -> Verdict:
     same = overlap(found.model, best.fit)
     candidates, free, none = explanations(found, same)
     candidates, free, none = _unheld(found, best, same, candidates, free, none)
-    word, effects, losses = least_loss(candidates, none, free, found.alike)
+    together = smallest_set(candidates, free)
+    candidates, free, untried = astray(candidates, free, none)
+    word, effects, losses = least_loss(candidates, none, free, untried, found.alike, together)
     accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found.model.spindle, found.model.tests)
     (before, plain), (after, density) = (left_out(found.model, h.fit, h.evidence, groups) for h in (found.base, accepted))
@@ -77,7 +80,7 @@ def decide(found: Search) -> Verdict:
     told = best if word == "unexplained" else accepted
     why += reason.of_tolerances(found.model, told, word != "unexplained") + reason.of_motions(found.model, told)
     why += reason.of_conventions(found.model, told)
-    unknown = sum(c.probability for c in rest)
+    unknown = untried + sum(c.probability for c in rest)
     return Verdict(word, effects, why, whole, rest, none, unknown, losses, before, after, density - plain, accepted, told)
 
 

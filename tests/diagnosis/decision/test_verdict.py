@@ -66,7 +66,7 @@ def test_a_name_beside_which_something_drifts_is_as_probable_as_it_is_told():
     assert little.candidates[0].probability > 0.95
     assert little.probability_unknown < 0.01
     assert little.accepted.names == ("a", "~x")
-    assert "all else together is less probable than 1 in 1000; beside it ~x drifts a little" in little.reason
+    assert "all else together has a probability of 0.0%; beside it ~x drifts a little" in little.reason
     assert mostly.probability_unknown > 0.95
     assert max(c.probability for c in mostly.candidates) < 0.01
 
