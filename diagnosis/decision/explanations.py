@@ -119,15 +119,22 @@ def explanations(found: Search, same: Overlap) -> tuple[tuple[Candidate, ...], t
     return likelier_first(c for c in every if not c.free), likelier_first(c for c in every if c.free), none
 
 
-def astray(candidates: Sequence[Candidate], free: Sequence[Candidate], none: float) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
-    """Probabilities as they have come true, and that of something that was not tried. Evidence that is large has it that nothing else is possible,
-    and is led `ASTRAY` all the same: the truth is then what was not tried, or an effect of the catalogue by evidence that counts as little as
-    where a model is known to be wrong (`COARSE`). It says nothing of `none`, which has come true as stated."""
-    shares = softmax([c.delta_evidence / (TOO_SURE * COARSE) for c in candidates]) if candidates else []
+def doubted(candidates: Sequence[Candidate], free: Sequence[Candidate], none: float) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
+    """Probabilities as they have come true (`astray`), and that of something that was not tried."""
+    told, untried = astray([c.delta_evidence for c in candidates], [c.probability for c in candidates], none)
+    named = (replace(c, probability=p) for c, p in zip(candidates, told, strict=True))
+    return likelier_first(named), likelier_first(replace(c, probability=(1 - ASTRAY) * c.probability) for c in free), untried
+
+
+def astray(gains: Sequence[float], probabilities: Sequence[float], none: float) -> tuple[list[float], float]:
+    """Of explanations of the catalogue, with what they gain in ln evidence, the probabilities as they have come true, and that of something that
+    was not tried. Evidence that is large has it that nothing else is possible, and is led `ASTRAY` all the same: the truth is then what was not
+    tried, or one of these by evidence that counts as little as where a model is known to be wrong (`COARSE`). `none` has come true as stated."""
     wrong = ASTRAY * (1 - none)
-    untried = UNTRIED * wrong if candidates else wrong
-    told = [replace(c, probability=(1 - ASTRAY) * c.probability + (wrong - untried) * float(share)) for c, share in zip(candidates, shares, strict=True)]
-    return likelier_first(told), likelier_first(replace(c, probability=(1 - ASTRAY) * c.probability) for c in free), untried
+    if not gains:
+        return [], wrong
+    shares = softmax(np.array(gains) / (TOO_SURE * COARSE))
+    return ((1 - ASTRAY) * np.array(probabilities) + (1 - UNTRIED) * wrong * shares).tolist(), UNTRIED * wrong
 
 
 def likelier_first(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:

@@ -13,8 +13,8 @@ from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import (
     Candidate,
     Names,
-    astray,
     discount,
+    doubted,
     explanations,
     likelier_first,
     likeliest,
@@ -68,7 +68,7 @@ def decide(found: Search) -> Verdict:
     candidates, free, none = explanations(found, same)
     candidates, free, none = _unheld(found, best, same, candidates, free, none)
     together = smallest_set(candidates, free)
-    candidates, free, untried = astray(candidates, free, none)
+    candidates, free, untried = doubted(candidates, free, none)
     word, effects, losses = least_loss(candidates, none, free, untried, found.alike, together)
     accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found.model.spindle, found.model.tests)

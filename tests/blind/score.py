@@ -22,6 +22,7 @@ from rich.table import Table
 from scipy.stats import binomtest
 
 from tests.blind.study import KINDS, RESULTS, ROOT, read
+from thermospindle.diagnosis.decision.explanations import ASTRAY, astray
 
 Row = dict[str, Any]
 OUTCOMES = ("right", "in the set", "half", "unexplained", "missed", "wrong", "false alarm", "error")
@@ -29,7 +30,7 @@ SHOWS = np.sqrt(10.0)
 VISIBLE = 2 * SHOWS
 LEAST = 1e-3
 MUCH = 0.3  # of the largest amount of what is hidden
-SURE = 0.99
+SURE = 0.95
 BINS = (0.0, 0.2, 0.5, 0.8, 0.95, 0.99, 1.0)
 DOCS = ROOT / "docs" / "blind.txt"
 
@@ -130,6 +131,16 @@ def true_names(row: Row, names: Sequence[str]) -> bool:
     )
 
 
+def restated(row: Row) -> Row:
+    """With probabilities as they are stated since evidence is said to be led astray (`decision.explanations.astray`), of a row from before that."""
+    if "astray" in row.get("weighed", {}) or row["verdict"] == "error":
+        return row
+    told, untried = astray([c["delta_evidence"] for c in row["candidates"]], [c["probability"] for c in row["candidates"]], row["probability"]["none"])
+    unknown = untried + (1 - ASTRAY) * row["probability"]["unknown"]
+    candidates = [c | {"probability": p} for c, p in zip(row["candidates"], told, strict=True)]
+    return row | {"probability": row["probability"] | {"unknown": unknown}, "candidates": candidates}
+
+
 def _answers(row: Row) -> list[tuple[float, bool]]:
     """The stated probability of nothing, of something unknown and of every candidate, and whether it is true."""
     found = [(row["probability"]["none"], not shows(row)), (row["probability"]["unknown"], nameless(row))]
@@ -220,7 +231,7 @@ def show(console: Console, rows: Sequence[Row]) -> None:
     for kind in (*KINDS, "all"):
         own = [r for r in rows if kind in ("all", r["kind"])]
         count = Counter(map(outcome, own))
-        score = f"{np.mean([np.log(max(truth_probability(r), LEAST)) for r in own]):.2f}" if own else ""
+        score = f"{_log_score(own):.2f}" if own else ""
         grid.add_row(kind, str(len(own)), *(str(count[o] or "") for o in OUTCOMES), score)
     console.print(grid)
     told = [r for r in rows if r["verdict"] != "error"]
@@ -252,16 +263,12 @@ def show(console: Console, rows: Sequence[Row]) -> None:
     for scene in sorted({r["scene"] for r in rows}):
         own = [r for r in rows if r["scene"] == scene]
         console.print(f"right or in the set, {Path(scene).name}: {share(own, lambda r: outcome(r) in ('right', 'in the set'))}")
-    table = Table("most probable answer's probability", "campaigns", "mean stated", "came true")
-    said = [most_probable(r) for r in told]
-    for low, high in pairwise(BINS):
-        own_bin = [a for a in said if low <= a[0] < high or (high == 1.0 and a[0] >= 1.0)]
-        if own_bin:
-            k = sum(true for _, true in own_bin)
-            a, b = interval(k, len(own_bin))
-            table.add_row(f"{low:g} to {high:g}", str(len(own_bin)), f"{np.mean([p for p, _ in own_bin]):.3f}", f"{k} ({a:.0%} to {b:.0%})")
-    console.print(table)
-    certain = [r for r in told if sure(r)]
+    console.print(_reliability("most probable answer's probability", told))
+    again = list(map(restated, told))
+    if again != told:
+        console.print(_reliability("the same, as it is stated today", again))
+        console.print(f"log score of all, as it is stated today: {_log_score(again):.2f}")
+    certain = [r for r in again if sure(r)]
     console.print(f"names stated above {SURE:g}, every one right: {share(certain, no_wrong_name)}")
     console.print(f"  and nothing that shows left out: {share(certain, lambda r: true_names(r, _likeliest(r)['effects']))}")
     if seconds := [r["seconds"] for r in rows]:
@@ -272,6 +279,23 @@ def show(console: Console, rows: Sequence[Row]) -> None:
     for r in rows:
         if outcome(r) not in ("right", "in the set"):
             console.print(f"- {outcome(r)}: {failure(r)}", markup=False)
+
+
+def _log_score(rows: Sequence[Row]) -> float:
+    return float(np.mean([np.log(max(truth_probability(r), LEAST)) for r in rows]))
+
+
+def _reliability(title: str, rows: Sequence[Row]) -> Table:
+    """How often the most probable answers came true, by the probability that was stated."""
+    table = Table(title, "campaigns", "mean stated", "came true")
+    said = [most_probable(r) for r in rows]
+    for low, high in pairwise(BINS):
+        own = [a for a in said if low <= a[0] < high or (high == 1.0 and a[0] >= 1.0)]
+        if own:
+            k = sum(true for _, true in own)
+            a, b = interval(k, len(own))
+            table.add_row(f"{low:g} to {high:g}", str(len(own)), f"{np.mean([p for p, _ in own]):.3f}", f"{k} ({a:.0%} to {b:.0%})")
+    return table
 
 
 def _ranges(seeds: Sequence[int]) -> str:

@@ -34,7 +34,7 @@ from tests.blind.mechanisms import mechanisms
 from tests.blind.visible import seen, visibility, visibility_beside
 from tests.blind.world import Plan, World
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.explanations import coarsening, likeliest
+from thermospindle.diagnosis.decision.explanations import ASTRAY, coarsening, likeliest
 from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
@@ -156,7 +156,7 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
 def weighed(found: Diagnosis) -> dict[str, Any]:
     """What a verdict is made of, for whoever asks what another weighing would have said: of every explanation
     its names, how many of them are free, ln evidence over the model without effects, the largest departure from
-    a law and the names whose law is the data's own; the inflation of the evidence, and whether it is coarsened."""
+    a law and the names whose law is the data's own; the inflation of the evidence, whether it is coarsened, and how often it is said to be led astray."""
     search, base = found.search, found.search.base.evidence.ln
     best = likeliest(search)
     same = overlap(search.model, best.fit)
@@ -173,6 +173,7 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
         ],
         "inflation": same.inflation,
         "coarse": coarsening(best, same),
+        "astray": ASTRAY,
         "screened": [
             len({s.mechanism.name for s in search.screened if s.mechanism.free == free and s.visibility > 0}) for free in (False, True)
         ],

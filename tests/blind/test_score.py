@@ -13,6 +13,7 @@ from tests.blind.score import (
     most_probable,
     no_wrong_name,
     outcome,
+    restated,
     show,
     sure,
     told_elsewhere,
@@ -20,6 +21,7 @@ from tests.blind.score import (
     visible,
 )
 from tests.blind.study import SCENES
+from thermospindle.diagnosis.decision.explanations import ASTRAY, UNTRIED
 
 
 def row(kind, verdict, effects=(), truth=(), none=0.0, unknown=0.0, candidates=(), drifts=(), elements=()):
@@ -79,7 +81,7 @@ def test_what_was_stated_for_sure_is_judged_by_name_and_as_a_whole():
         row("two", "identified", names, [["a"], ["c"]], candidates=[(names, 0.999), (["b"], 0.001)]) for names in (["a"], ["a", "c"], ["b"])
     )
     assert [(sure(r), no_wrong_name(r)) for r in (half, whole, wrong)] == [(True, True), (True, True), (True, False)]
-    assert not sure(row("one", "identified", ["a"], [["a"]], candidates=[(["a"], 0.98)]))
+    assert not sure(row("one", "identified", ["a"], [["a"]], candidates=[(["a"], 0.94)]))
     assert not sure(row("nothing", "none", none=1.0))
     console = Console(record=True, width=160)
     with console.capture() as captured:
@@ -124,3 +126,12 @@ def test_of_two_that_do_the_same_either_is_the_whole_answer():
     assert outcome(both | alike) == "right"
     assert not visible(both | alike)
     assert outcome(row("two", "none", [], [["preload_loss"], ["clearance_opening"]]) | alike) == "missed"
+
+
+def test_rows_from_before_evidence_was_said_to_go_astray_are_stated_anew_and_others_are_not():
+    old = row("one", "identified", ["a"], [["a"]], candidates=[(["a"], 1.0), (["c"], 0.0)])
+    told = restated(old)
+    assert told["probability"]["none"] + told["probability"]["unknown"] + sum(c["probability"] for c in told["candidates"]) == pytest.approx(1.0)
+    assert 1 - ASTRAY < told["candidates"][0]["probability"] < 1 - UNTRIED * ASTRAY
+    assert told["candidates"][1]["probability"] > 0.01
+    assert restated(old | {"weighed": {"astray": ASTRAY}})["candidates"] == old["candidates"]
