@@ -315,7 +315,7 @@ class CampaignModel:
             linear = self.linear(t, x, effects)
             return linear, self.answer(t, x, linear), effects
 
-        linear, answer, _ = self._responses.of((t, x.tobytes(), tuple((id(e), *v.values()) for e, v in effects)), worked_out)
+        linear, answer, _ = self._responses.of((t, x.tobytes(), _asking(effects)), worked_out)
         return linear, answer
 
     @cached_property
@@ -343,9 +343,10 @@ def _modal(discrepancies: Discrepancies, x: Array, modes: int) -> Array:
     return np.where(found == 0, found.T, found)
 
 
-def _asking(effects: Applied, hooks: Sequence[str]) -> tuple:
-    """What tells those of the effects that have one of these hooks from others."""
-    return tuple((id(e), *v.values()) for e, v in effects if not e.hooks.isdisjoint(hooks))
+def _asking(effects: Applied, hooks: Sequence[str] = HOOKS) -> tuple:
+    """What tells those of the effects that have one of these hooks from others: each and its values,
+    by name, for ways to act list them in orders of their own."""
+    return tuple((id(e), frozenset(v.items())) for e, v in effects if not e.hooks.isdisjoint(hooks))
 
 
 def within_limits(effects: Applied) -> list[tuple[Effect, Values]]:

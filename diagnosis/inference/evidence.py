@@ -111,8 +111,12 @@ def evidence(
     def scaled(s: float) -> Quadratic:
         return Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
 
+    @cache
+    def of_nuisances(s: float) -> Array:
+        return np.ascontiguousarray(scaled(s).a[:p, :p])
+
     def beside(s: float, sizes: Mapping[str, float]) -> Nuisances:
-        return under(nuisance_root(model, sizes, fit.moved), scaled(s).a[:p, :p])
+        return under(nuisance_root(model, sizes, fit.moved), of_nuisances(s))
 
     def each(s: float, sizes: Mapping[str, float], nuisances: Nuisances | None = None) -> Array:
         """ln evidence of every combination of widths, departures and offsets of the mechanisms, by its prior odds."""
@@ -122,7 +126,7 @@ def evidence(
     nuisances = None
     if near:
         every = [(each(n.errors, n.sizes, own), n.errors, dict(n.sizes), own) for n, own in zip_longest(near, kept)]
-        values, s, sizes, nuisances = max(every, key=lambda row: logsumexp(row[0]))
+        values, s, sizes, nuisances = max(every, key=lambda row: np.logaddexp.reduce(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 or learning is not None else [float(s) for s in _error_scales(whole, fit.count)]
         values, s, sizes = likeliest(each, grids, scales)

@@ -178,8 +178,10 @@ def together(scale: Array, beside: Array) -> csr_array:
     (P,), and `beside` (P, k) what is not each by itself; those without either have no columns."""
     wide = np.flatnonzero(scale)
     rows, columns = beside.nonzero()
-    terms, places = np.concatenate([scale[wide], beside[rows, columns]]), (np.concatenate([wide, rows]), np.concatenate([np.arange(len(wide)), len(wide) + columns]))
-    return csr_array((terms, places), shape=(len(scale), len(wide) + beside.shape[1]))
+    by_row = np.argsort(np.concatenate([wide, rows]), kind="stable")
+    terms, places = np.concatenate([scale[wide], beside[rows, columns]])[by_row], np.concatenate([np.arange(len(wide)), len(wide) + columns])[by_row]
+    first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(scale)) + (scale != 0))])
+    return csr_array((terms, places, first), shape=(len(scale), len(wide) + beside.shape[1]))
 
 
 def nuisance_root(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> csr_array:

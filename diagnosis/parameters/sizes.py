@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise, product
 
 import numpy as np
-from scipy.special import logsumexp
 
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.model.types import Array
@@ -77,7 +76,7 @@ def likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mappin
         key = s, *(sizes[kind] for kind in grids)
         if key not in known:
             values = each(s, sizes)
-            known[key] = float(logsumexp(values)), values
+            known[key] = float(np.logaddexp.reduce(values)), values
         return known[key]
 
     s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}

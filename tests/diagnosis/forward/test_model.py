@@ -217,6 +217,19 @@ def test_column_of_an_effect_on_matrices(scene):
     assert np.linalg.norm(found - wanted) < 0.5 * np.linalg.norm(secant - wanted)
 
 
+def test_ways_to_act_that_list_their_values_in_another_order_are_not_taken_for_each_other(scene):
+    """Each holds another parameter and lists it first: told by its values alone a way was answered with what another does, and where one core does
+    all in one process a campaign had another answer than with two."""
+    model, x = made(scene)
+    m = effect("thermal_gradient")
+    one, other = ({"scale": 2.0, "common_share": a, "level_share": b} for a, b in ((1.0, 0.4), (0.4, 1.0)))
+    reordered = {name: other[name] for name in ("scale", "level_share", "common_share")}
+    assert list(one.values()) == list(reordered.values())
+    at, kept = model.residual(1, x, [(m, one)]), model.residual(1, x, [(m, reordered)])
+    assert np.array_equal(kept, made(scene)[0].residual(1, x, [(m, other)]))
+    assert np.abs(at - kept).max() > 0.1
+
+
 def test_modes_beyond_the_band_may_be_wrong_too(scene):
     """By their stiffness, which lends the band a spring: as the lines of a dense model have it
     whose stiffness is off along one of them. Not by their damping."""
