@@ -5,7 +5,7 @@ The receptance between hammers B and points A is A D(s)^-1 B^T with D = s^2 M + 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -343,7 +343,7 @@ def _modal(discrepancies: Discrepancies, x: Array, modes: int) -> Array:
     return np.where(found == 0, found.T, found)
 
 
-def _asking(effects: Applied, hooks: Sequence[str] = HOOKS) -> tuple:
+def _asking(effects: Applied, hooks: Collection[str] = tuple(HOOKS)) -> tuple:
     """What tells those of the effects that have one of these hooks from others: each and its values,
     by name, for ways to act list them in orders of their own."""
     return tuple((id(e), frozenset(v.items())) for e, v in effects if not e.hooks.isdisjoint(hooks))

@@ -82,6 +82,21 @@ def test_a_promise_is_over_the_model_without_it_at_the_same_place(spindle):
     assert np.abs(linearised(model, one).information - linearised(model, other).information).max() > 1.0
 
 
+def test_what_a_mechanism_promises_has_nothing_to_do_with_what_was_screened_before(spindle):
+    """Ways in which one effect may act are screened by one process on one core, and by several on more."""
+    ways = variants(effect("thermal_gradient"))
+    hidden = [(ways[0].effect, ways[0].values(3.0, [q.neutral for q in ways[0].shape]))]
+    made = mode_campaign(spindle, (*TESTS[:2], Condition(60.0, 7200 * RPM)), 3, hidden)
+
+    def promised(*of):
+        model = model_of(spindle, made)
+        about = fit(model)
+        return [s.gain for s in screen(model, about, 1.0, steady(evidence(model, about).learned), of, 1)[: len(of)]]
+
+    assert len(ways) == 5
+    assert promised(*ways) == pytest.approx(promised(*ways[::-1])[::-1], rel=1e-9)
+
+
 def test_what_hardly_shows_while_errors_are_enlarged_is_found_where_a_misfit_is_small(spindle):
     """A delay of half a microsecond in one channel, by hundreds in ln evidence, which thirty times as large errors hide. Blind campaign
     2448 was answered *none*: beside a misfit, told by errors some per cent larger, nothing was asked at the errors as they are."""
