@@ -27,7 +27,7 @@ def checked(found: Diagnosis) -> Diagnosis:
     """A verdict that holds together, whatever it says."""
     v = found.verdict
     assert v.word in ("none", "identified", "ambiguous", "two effects", "unexplained")
-    assert v.probability_none + sum(c.probability for c in (*v.candidates, *v.free)) == pytest.approx(1.0)
+    assert v.probability_none + v.probability_unknown + sum(c.probability for c in v.candidates) == pytest.approx(1.0)
     assert v.reason
     print(v.word, v.effects, [(c.names, round(c.delta_evidence, 1), round(c.probability, 3)) for c in (*v.candidates[:3], *v.free[:2])])
     return found
