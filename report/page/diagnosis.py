@@ -82,9 +82,9 @@ def _verdict(answer: dict[str, Any]) -> str:
 
 
 CANDIDATES = (
-    "ln evidence is against the model without effects, and so is the error on conditions left out; probability among everything tried: no effect, one, "
-    "two, and free drift, which is something unknown. "
-    "Two effects at once are believed less beforehand."
+    "ln evidence is against the model without effects, and so is the error on conditions left out; probability is that of no effect, one, "
+    "two, and something unknown: free drift, or what was not tried. Two effects at once are believed less beforehand; and no evidence makes "
+    "an answer surer than such answers have come true, nine times in ten where the truth was known."
 )
 
 
