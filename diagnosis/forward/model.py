@@ -343,7 +343,7 @@ def _modal(discrepancies: Discrepancies, x: Array, modes: int) -> Array:
     return np.where(found == 0, found.T, found)
 
 
-def _asking(effects: Applied, hooks: Collection[str] = tuple(HOOKS)) -> tuple:
+def _asking(effects: Applied, hooks: Collection[str] = HOOKS) -> tuple:
     """What tells those of the effects that have one of these hooks from others: each and its values,
     by name, for ways to act list them in orders of their own."""
     return tuple((id(e), frozenset(v.items())) for e, v in effects if not e.hooks.isdisjoint(hooks))
