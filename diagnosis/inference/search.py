@@ -11,10 +11,11 @@ import numpy as np
 from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import TEMPERS, fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, settled, widened
 from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, rivals_beside, without_one
+from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import beside, with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
@@ -32,6 +33,7 @@ from thermospindle.diagnosis.inference.singles import (
     of_each_name,
 )
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, with_own_laws
+from thermospindle.diagnosis.parameters.nuisance import BUILD
 from thermospindle.model.parallel import in_parallel, meanwhile, tell
 from thermospindle.model.types import Array
 
@@ -40,6 +42,8 @@ NEAR = 100.0  # ln evidence behind the best, so far
 UNLIKELY = 5.0  # ln evidence behind the best, of a way to act that need not be told
 GAINED = {1: LITTLE, 2: ENOUGH, 3: PLENTY}  # ln evidence of one effect, of a second and of a third, of which other ways are asked: an effect that is not needed has no way
 RIVALS = 3  # explanations of which other ways are asked, at most: each shares its prior among all that its effects have
+STALLED = 3.0  # times the errors that the model without effects leaves, from which it may have stalled
+OFF, WIDER = (-20.0, -10.0, -5.0, 5.0, 10.0, 20.0), (3.0, 5.0)  # standard deviations by which a build tolerance is off where it then starts, and times as wide as stated
 WAYS = 8  # in which an effect of these may act too, at most, those that screening promises most of
 
 
@@ -66,10 +70,10 @@ def search(
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or
     beside the best single one; and one that moves with temperature where no effect alone explains them, and it explains more."""
     with meanwhile(partial(with_own_laws, named, model.spindle, [d.condition for d in model.tests]), workers) as own_laws:
-        none = _without_effects(model)
+        none = _without_effects(model, workers)
         if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
             model = hit
-            none = _without_effects(model)
+            none = _without_effects(model, workers)
         plain = none
         model, none = with_resonance(model, none, workers) or (model, none)
         every = [*named, *own_laws(), *free]
@@ -82,7 +86,7 @@ def search(
     before = model
     if len(wider.resonances) > len(model.resonances):
         model = wider
-        none = _without_effects(model)
+        none = _without_effects(model, workers)
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
             tried = fit_singles(model, none, every, lambda done: None, workers)  # steps that were counted already
         else:
@@ -119,9 +123,21 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
     return tried, joined(model, none, tried.singles, every, tried.most, tried.expected, workers)
 
 
-def _without_effects(model: CampaignModel) -> Hypothesis:
+def _without_effects(model: CampaignModel, workers: int | None) -> Hypothesis:
     first = fit(model, done=tell)
+    if first.chi2 > STALLED**2 * first.count:
+        first = min(first, *in_parallel(partial(_from_afar, model), WIDER, workers), key=lambda f: f.cost)
     return settled(model, Hypothesis(first, evidence(model, first)))
+
+
+def _from_afar(model: CampaignModel, wider: float) -> Fit:
+    """A fit without effects from the one build tolerance that alone brings peaks nearest, with tolerances so much `wider` until errors are as
+    stated: what moves peaks by many of their widths has no slope to follow from the drawing. Of 88 campaigns of a disk, of a mount that is
+    otherwise, or both, 22 left 10 times the errors and more from the drawing, and none from here; light resonances then stood in for these."""
+    build = [k for k, q in enumerate(model.parameters) if q.kind == BUILD]
+    starts = [np.zeros(len(model.parameters)), *(at * row for row in np.eye(len(model.parameters))[build] for at in OFF)]
+    near = fit(model, (), starts, tempers=TEMPERS[1:-1], learned=Learned({BUILD: wider}, 1.0))
+    return fit(model, (), near.point, near.rates, TEMPERS[-1:])
 
 
 def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:
