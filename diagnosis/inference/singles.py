@@ -65,7 +65,8 @@ def fit_singles(
         about, temper = fit(model, tempers=TEMPERS[: EARLY + 1], learned=expected), TEMPERS[EARLY]
     else:
         about, temper = none.fit, 1.0
-    far = misfit and far_off(model, about)
+    if far := misfit and far_off(model, about):  # it may have stalled where the model without effects has not
+        about = min(about, fit(model, (), none.fit.point, none.fit.rates, (temper,), expected), key=lambda f: f.cost)
     with meanwhile(partial(cost_of, model, none, expected), workers) as most_of:
         looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, mechanisms, workers)
         rankings = [looked]
