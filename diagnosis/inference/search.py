@@ -42,8 +42,9 @@ NEAR = 100.0  # ln evidence behind the best, so far
 UNLIKELY = 5.0  # ln evidence behind the best, of a way to act that need not be told
 GAINED = {1: LITTLE, 2: ENOUGH, 3: PLENTY}  # ln evidence of one effect, of a second and of a third, of which other ways are asked: an effect that is not needed has no way
 RIVALS = 3  # explanations of which other ways are asked, at most: each shares its prior among all that its effects have
-STALLED = 3.0  # times the errors that the model without effects leaves, from which it may have stalled
-OFF, WIDER = (-20.0, -10.0, -5.0, 5.0, 10.0, 20.0), (3.0, 5.0)  # standard deviations by which a build tolerance is off where it then starts, and times as wide as stated
+STALLED = 2.0  # times the errors that the model without effects leaves, from which it may have stalled
+OFF = (-20.0, -10.0, -5.0, 5.0, 10.0, 20.0)  # standard deviations by which a build tolerance is off where it then starts
+AFAR = (((1, 3.0), (1, 5.0)), ((4, 3.0), (4, 10.0)))  # how many are, and times as wide as stated they may be; what follows where it stalls still
 WAYS = 8  # in which an effect of these may act too, at most, those that screening promises most of
 
 
@@ -125,18 +126,24 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
 
 def _without_effects(model: CampaignModel, workers: int | None) -> Hypothesis:
     first = fit(model, done=tell)
-    if first.chi2 > STALLED**2 * first.count:
-        first = min(first, *in_parallel(partial(_from_afar, model), WIDER, workers), key=lambda f: f.cost)
+    for ways in AFAR:
+        if first.chi2 > STALLED**2 * first.count:
+            first = min(first, *in_parallel(partial(_from_afar, model), ways, workers), key=lambda f: f.cost)
     return settled(model, Hypothesis(first, evidence(model, first)))
 
 
-def _from_afar(model: CampaignModel, wider: float) -> Fit:
-    """A fit without effects from the one build tolerance that alone brings peaks nearest, with tolerances so much `wider` until errors are as
-    stated: what moves peaks by many of their widths has no slope to follow from the drawing. Of 88 campaigns of a disk, of a mount that is
-    otherwise, or both, 22 left 10 times the errors and more from the drawing, and none from here; light resonances then stood in for these."""
-    build = [k for k, q in enumerate(model.parameters) if q.kind == BUILD]
-    starts = [np.zeros(len(model.parameters)), *(at * row for row in np.eye(len(model.parameters))[build] for at in OFF)]
-    near = fit(model, (), starts, tempers=TEMPERS[1:-1], learned=Learned({BUILD: wider}, 1.0))
+def _from_afar(model: CampaignModel, way: tuple[int, float]) -> Fit:
+    """A fit without effects from so many build tolerances, one after the other, as bring peaks nearest, with tolerances so many times as wide
+    until errors are as stated: what moves peaks by many of their widths has no slope to follow from the drawing. Of 88 campaigns of a disk, of
+    a mount that is otherwise, or both, 22 left 3 times the errors and more from the drawing, and light resonances then stood in for these; and
+    of 54 with all tolerances 3 to 12 times as far off as stated 14. From here one does."""
+    count, wider = way
+    learned, n = Learned({BUILD: wider}, 1.0), len(model.parameters)
+    problem, build = Problem(model.thinned, (), learned), np.eye(n)[[k for k, q in enumerate(model.parameters) if q.kind == BUILD]]
+    start = np.zeros(n)
+    for _ in range(count):
+        start = min((start, *(start + off * row for row in build for off in OFF)), key=lambda p: problem.cost(p, TEMPERS[1]))
+    near = fit(model, (), start, tempers=TEMPERS[1:-1], learned=learned)
     return fit(model, (), near.point, near.rates, TEMPERS[-1:])
 
 

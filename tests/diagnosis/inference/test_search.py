@@ -250,6 +250,17 @@ def test_a_mount_far_from_the_drawing_is_no_light_resonance(spindle):
     assert stiffness < -5.0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "factor"), [(303, 10.0), (402, 12.0)])
+def test_a_drawing_that_is_far_off_everywhere_is_fitted(spindle, seed, factor):
+    """Every tolerance is `factor` times as far off as it may be: 50 times the errors were left."""
+    far = drawn(spindle, 1, seed)
+    far = replace(far, build=np.clip(factor * far.build, -0.6, 1.5))
+    model = model_of(spindle, virtual_campaign(spindle, TESTS[:1], seed, [], far, responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 24.0)))
+    none = _without_effects(model, 1)
+    assert none.fit.chi2 < 1.3 * none.fit.count
+
+
 def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):
     """A campaign of another's, with an absorber, left it at a chi2 of 729 a number, and bearing
     damping of 0 +- 6 % at 1.2. An effect that does something says nothing of it."""
