@@ -124,7 +124,7 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
     return tried, joined(model, none, tried.singles, every, tried.most, tried.expected, workers)
 
 
-def _without_effects(model: CampaignModel, workers: int | None) -> Hypothesis:
+def _without_effects(model: CampaignModel, workers: int | None = None) -> Hypothesis:
     first = fit(model, done=tell)
     for ways in AFAR:
         if first.chi2 > STALLED**2 * first.count:
