@@ -42,7 +42,7 @@ NEAR = 100.0  # ln evidence behind the best, so far
 UNLIKELY = 5.0  # ln evidence behind the best, of a way to act that need not be told
 GAINED = {1: LITTLE, 2: ENOUGH, 3: PLENTY}  # ln evidence of one effect, of a second and of a third, of which other ways are asked: an effect that is not needed has no way
 RIVALS = 3  # explanations of which other ways are asked, at most: each shares its prior among all that its effects have
-STALLED = 2.0  # times the errors that the model without effects leaves, from which it may have stalled
+MISSED = 2.0  # times the errors that the model without effects leaves, from which it may have stalled
 OFF = (-20.0, -10.0, -5.0, 5.0, 10.0, 20.0)  # standard deviations by which a build tolerance is off where it then starts
 AFAR = (((1, 3.0), (1, 5.0)), ((4, 3.0), (4, 10.0)))  # how many are, and times as wide as stated they may be; what follows where it stalls still
 WAYS = 8  # in which an effect of these may act too, at most, those that screening promises most of
@@ -127,7 +127,7 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
 def _without_effects(model: CampaignModel, workers: int | None = None) -> Hypothesis:
     first = fit(model, done=tell)
     for ways in AFAR:
-        if first.chi2 > STALLED**2 * first.count:
+        if first.chi2 > MISSED**2 * first.count:
             first = min(first, *in_parallel(partial(_from_afar, model), ways, workers), key=lambda f: f.cost)
     return settled(model, Hypothesis(first, evidence(model, first)))
 
