@@ -128,23 +128,27 @@ def _without_effects(model: CampaignModel, workers: int | None = None) -> Hypoth
     first = fit(model, done=tell)
     for ways in AFAR:
         if first.chi2 > MISSED**2 * first.count:
-            first = min(first, *in_parallel(partial(_from_afar, model), ways, workers), key=lambda f: f.cost)
+            found = in_parallel(partial(_from_afar, model), ways, workers)
+            first = min((first, *(f for f in found if f is not None)), key=lambda f: f.cost)
     return settled(model, Hypothesis(first, evidence(model, first)))
 
 
-def _from_afar(model: CampaignModel, way: tuple[int, float]) -> Fit:
+def _from_afar(model: CampaignModel, way: tuple[int, float]) -> Fit | None:
     """A fit without effects from so many build tolerances, one after the other, as bring peaks nearest, with tolerances so many times as wide
     until errors are as stated: what moves peaks by many of their widths has no slope to follow from the drawing. Of 88 campaigns of a disk, of
     a mount that is otherwise, or both, 22 left 3 times the errors and more from the drawing, and light resonances then stood in for these; and
-    of 54 with all tolerances 3 to 12 times as far off as stated 14. From here one does."""
+    of 54 with all tolerances 3 to 12 times as far off as stated 14. From here one does. None where it leads to what cannot be built."""
     count, wider = way
     learned, n = Learned({BUILD: wider}, 1.0), len(model.parameters)
     problem, build = Problem(model.thinned, (), learned), np.eye(n)[[k for k, q in enumerate(model.parameters) if q.kind == BUILD]]
     start = np.zeros(n)
     for _ in range(count):
         start = min((start, *(start + off * row for row in build for off in OFF)), key=lambda p: problem.cost(p, TEMPERS[1]))
-    near = fit(model, (), start, tempers=TEMPERS[1:-1], learned=learned)
-    return fit(model, (), near.point, near.rates, TEMPERS[-1:])
+    try:
+        near = fit(model, (), start, tempers=TEMPERS[1:-1], learned=learned)
+        return fit(model, (), near.point, near.rates, TEMPERS[-1:])
+    except FAILED:
+        return None
 
 
 def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:

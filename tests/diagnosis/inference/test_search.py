@@ -250,6 +250,22 @@ def test_a_mount_far_from_the_drawing_is_no_light_resonance(spindle):
     assert stiffness < -5.0
 
 
+def test_where_no_other_start_can_be_built_the_first_fit_stands(spindle, monkeypatch):
+    """Of five_bearing, every tolerance 12 times as far off as it may be, one start ended in a LinAlgError."""
+    model = of_a_softer_mount(spindle, TESTS[:1], 112, 0.46, 48.0)
+    asked: list[object] = []
+
+    def fails(model, *args, **kinds):
+        if args or kinds.keys() - {"done"}:
+            asked.append(kinds)
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return fit(model)
+
+    monkeypatch.setattr("thermospindle.diagnosis.inference.search.fit", fails)
+    assert _without_effects(model, 1).fit.chi2 > 1000 * model.tests[0].count
+    assert len(asked) == 4
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "factor"), [(303, 10.0), (402, 12.0)])
 def test_a_drawing_that_is_far_off_everywhere_is_fitted(spindle, seed, factor):
