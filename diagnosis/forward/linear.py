@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg import svd
 
 from thermospindle.diagnosis.parameters.masses import MassTerm
 from thermospindle.model.machine import Spindle
@@ -104,7 +105,7 @@ def products(mass: Array, damping: Array, stiffness: Array, lost: Array | None =
     for exponent, change in ((2, mass), (1, damping), (0, stiffness), *enumerate(() if lost is None else lost, BY_LAW)):
         rows, columns = np.flatnonzero(change.any(axis=1)), np.flatnonzero(change.any(axis=0))
         if len(rows):
-            u, size, v = np.linalg.svd(change[np.ix_(rows, columns)], full_matrices=False)
+            u, size, v = _singular(change[np.ix_(rows, columns)])
             kept = np.flatnonzero(size > EXACT * size[0])
             power += [exponent] * len(kept)
             left.append(np.zeros((n, len(kept))))
@@ -112,6 +113,15 @@ def products(mass: Array, damping: Array, stiffness: Array, lost: Array | None =
             left[-1][rows], right[-1][columns] = u[:, kept] * size[kept], v[kept].T
     moves = np.zeros(min(len(power), 1), int)
     return Products(1, moves, moves, np.array(power, int), np.concatenate(left, axis=1), np.concatenate(right, axis=1))
+
+
+def _singular(change: Array) -> tuple[Array, Array, Array]:
+    """Singular vectors and values; by QR where divide and conquer, which is quicker, does not converge on a matrix without fault."""
+    try:
+        return np.linalg.svd(change, full_matrices=False)
+    except np.linalg.LinAlgError:
+        found: tuple[Array, Array, Array] = svd(change, full_matrices=False, lapack_driver="gesvd")
+        return found
 
 
 def as_dampers(left: Array, power: Integers) -> tuple[Array, Integers]:

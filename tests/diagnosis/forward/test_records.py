@@ -85,3 +85,20 @@ def test_a_change_of_more_products_than_degrees_of_freedom(scene, share):
     found, of_few = at.moved(together([every, few]))
     assert found == pytest.approx(sum(at.moved(by)[0] for by in apart), abs=1e-10 * np.abs(found).max())
     assert of_few == pytest.approx(at.moved(few)[0], abs=1e-10 * np.abs(of_few).max())
+
+
+def test_changes_are_products_whatever_a_decomposition_does(scene, monkeypatch):
+    """Divide and conquer did not converge on what temperature changed in the stiffness of five_bearing, a matrix without fault."""
+    model, x = made(scene)
+    m = model.linear(0, x, []).matrices
+    there = products(m.mass, m.damping, m.stiffness)
+
+    def fails(*args, **kinds):
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(np.linalg, "svd", fails)
+    found = products(m.mass, m.damping, m.stiffness)
+    assert found.power.tolist() == there.power.tolist()
+    for power, whole in enumerate((m.stiffness, m.damping, m.mass)):
+        of = found.power == power
+        assert found.left[:, of] @ found.right[:, of].T == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
