@@ -197,6 +197,7 @@ def test_the_keyboard_alone_looks_through_the_effects_adds_one_and_undoes_it(tab
     tab.wait(f"!!{first}")
     tab.key("z", 90, modifiers=2)
     tab.wait(f"{added} === 0")
+    tab.wait("!Bokeh.documents[0].get_model_by_name('redo').disabled")  # it comes after the list
     tab.key("y", 89, modifiers=2)
     tab.wait(f"{added} === 1")
     tab.run("find(e => e.type === 'text' && e.name !== 'name').focus() ?? true")
