@@ -32,6 +32,11 @@ def effect(name: str) -> Effect:
     return next(e for e in CATALOGUE if e.name == name)
 
 
+def neutral_but(*named: tuple[str, Values]) -> list[tuple[Effect, Values]]:
+    """Effects of the catalogue with these values, and neutral in all else."""
+    return [(effect(name), {q.name: q.neutral for q in effect(name).parameters} | values) for name, values in named]
+
+
 def noisy(exact: ComplexArray, random: np.random.Generator, noise: Noise = NOISE) -> ComplexArray:
     """`exact` with independent complex errors of the standard deviation that `noise` states of it."""
     sd = noise_model(exact, noise.of_value, noise.of_largest)

@@ -140,7 +140,7 @@ def _from_afar(model: CampaignModel, way: tuple[int, float]) -> Fit | None:
     of 54 with all tolerances 3 to 12 times as far off as stated 14. From here one does. None where it leads to what cannot be built."""
     count, wider = way
     learned, n = Learned({BUILD: wider}, 1.0), len(model.parameters)
-    problem, build = Problem(model.thinned, (), learned), np.eye(n)[[k for k, q in enumerate(model.parameters) if q.kind == BUILD]]
+    problem, build = Problem(model.thinned, (), learned), np.eye(n)[: len(model.build)]
     start = np.zeros(n)
     for _ in range(count):
         start = min((start, *(start + off * row for row in build for off in OFF)), key=lambda p: problem.cost(p, TEMPERS[1]))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
+from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, neutral_but, virtual_campaign
 from thermospindle.diagnosis.inference import pairs
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
@@ -41,8 +41,7 @@ def test_a_second_cause_that_hardly_shows_is_weighed(spindle, monkeypatch, promi
 
 def of_a_disk_and_a_mount(spindle, tests):
     """A disk of 3 g on the hub and a mount 30 % softer, in every test: no single mechanism moves all peaks to where they are."""
-    hidden = [("added_disk", {"mass": 3.0}), ("mount_compliance", {"compliance": 0.3, "thermal_share": 0.0})]
-    both = [(effect(name), {q.name: q.neutral for q in effect(name).parameters} | own) for name, own in hidden]
+    both = neutral_but(("added_disk", {"mass": 3.0}), ("mount_compliance", {"compliance": 0.3, "thermal_share": 0.0}))
     return virtual_campaign(spindle, tests, 5, both, drawn(spindle, len(tests), 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 24.0))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.hand_made_search import mechanism
-from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
+from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, neutral_but, virtual_campaign
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.inference import hypothesis, singles
 from thermospindle.diagnosis.inference.evidence import evidence
@@ -224,10 +224,8 @@ def test_shapes_are_known_in_their_own_units(spindle):
 
 def of_a_softer_mount(spindle, tests, seed, softer, step, *beside):
     """A model of tests of a mount that is softer than drawn, so much that from the drawing its peaks have no slope to follow."""
-    values = [(effect(name), {q.name: q.neutral for q in effect(name).parameters} | own) for name, own in beside]
-    mount = effect("mount_compliance")
-    values.append((mount, {q.name: q.neutral for q in mount.parameters} | {"compliance": softer, "thermal_share": 0.0}))
-    return model_of(spindle, virtual_campaign(spindle, tests, seed, values, drawn(spindle, len(tests), seed), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, step)))
+    hidden = neutral_but(*beside, ("mount_compliance", {"compliance": softer, "thermal_share": 0.0}))
+    return model_of(spindle, virtual_campaign(spindle, tests, seed, hidden, drawn(spindle, len(tests), seed), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, step)))
 
 
 @pytest.mark.slow
