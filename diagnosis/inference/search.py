@@ -45,6 +45,7 @@ RIVALS = 3  # explanations of which other ways are asked, at most: each shares i
 MISSED = 2.0  # times the errors that the model without effects leaves, from which it may have stalled
 OFF = (-20.0, -10.0, -5.0, 5.0, 10.0, 20.0)  # standard deviations by which a build tolerance is off where it then starts
 AFAR = (((1, 3.0), (1, 5.0)), ((4, 3.0), (4, 10.0)))  # how many are, and times as wide as stated they may be; what follows where it stalls still
+FINER = 2  # times that hits which no test tells are sought, each with less else that is left
 WAYS = 8  # in which an effect of these may act too, at most, those that screening promises most of
 
 
@@ -71,12 +72,8 @@ def search(
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or
     beside the best single one; and one that moves with temperature where no effect alone explains them, and it explains more."""
     with meanwhile(partial(with_own_laws, named, model.spindle, [d.condition for d in model.tests]), workers) as own_laws:
-        none = _without_effects(model, workers)
-        if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
-            model = hit
-            none = _without_effects(model, workers)
-        plain = none
-        model, none = with_resonance(model, none, workers) or (model, none)
+        model, plain = _hit_when_it_was(model, workers)
+        model, none = with_resonance(model, plain, workers) or (model, plain)
         every = [*named, *own_laws(), *free]
     progress("fitted without effects")
     tried = fit_singles(model, none, every, progress, workers)
@@ -124,13 +121,59 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
     return tried, joined(model, none, tried.singles, every, tried.most, tried.expected, workers)
 
 
+def _hit_when_it_was(model: CampaignModel, workers: int | None = None) -> tuple[CampaignModel, Hypothesis]:
+    """The model with its tests hit where their lines say, if they do not tell, and it fitted without effects. What a fit misses
+    for that alone is explained by it, and needs no start from afar; and what it explains tells the times of hits the finer."""
+    told, first = model, fit(model, done=tell)
+    if _missed(first):
+        hit = _hit(model, Hypothesis(first, evidence(model, first)))
+        if hit is not None and not _missed(again := fit(hit, done=tell)):
+            told, first = hit, again
+    none = _reached(told, first, workers)
+    for _ in range(FINER):
+        hit = _hit(model, none)
+        if hit is None or _times(hit) == _times(told):
+            break
+        told, none = hit, _without_effects(hit, workers)
+    return told, none
+
+
+def _hit(model: CampaignModel, none: Hypothesis) -> CampaignModel | None:
+    return hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)
+
+
+def _times(model: CampaignModel) -> list[float | None]:
+    return [d.test.pretrigger for d in model.tests]
+
+
 def _without_effects(model: CampaignModel, workers: int | None = None) -> Hypothesis:
-    first = fit(model, done=tell)
+    return _reached(model, fit(model, done=tell), workers)
+
+
+def _reached(model: CampaignModel, first: Fit, workers: int | None) -> Hypothesis:
+    """The fit without effects, or where it stalled a better one from afar, settled."""
     for ways in AFAR:
-        if first.chi2 > MISSED**2 * first.count:
+        if _missed(first):
             found = in_parallel(partial(_from_afar, model), ways, workers)
             first = min((first, *(f for f in found if f is not None)), key=lambda f: f.cost)
-    return settled(model, Hypothesis(first, evidence(model, first)))
+    h = settled(model, Hypothesis(first, evidence(model, first)))
+    return _by_wider_tolerances(model, h) if _missed(h.fit) else h
+
+
+def _missed(first: Fit) -> bool:
+    """Whether a fit without effects leaves so much that it may have stalled."""
+    return first.chi2 > MISSED**2 * first.count
+
+
+def _by_wider_tolerances(model: CampaignModel, h: Hypothesis) -> Hypothesis:
+    """The model without effects from where tolerances as wide as the data have them lead, if these let peaks find each other which
+    the model's constant errors alone had moved: else a light resonance is taken in for a drawing that is off in several joints."""
+    there = widened(model, h)
+    try:
+        again = fit(model, (), there.fit.point, there.fit.rates, TEMPERS[-1:])
+    except FAILED:
+        return h
+    return max(h, settled(model, Hypothesis(again, evidence(model, again))), key=lambda h: h.evidence.ln)
 
 
 def _from_afar(model: CampaignModel, way: tuple[int, float]) -> Fit | None:

@@ -11,7 +11,8 @@ import pytest
 from tests.virtual_campaign import drawn, model_of, noisy, truth, virtual_campaign
 from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.response import Response
-from thermospindle.diagnosis.inference.search import _without_effects
+from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.search import _hit_when_it_was
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Noise
@@ -41,11 +42,10 @@ def hit(spindle, *before, told=(), times=1.0):
 @pytest.mark.parametrize("before", [2.2e-3, pytest.param(0.6e-3, marks=pytest.mark.slow)])
 def test_a_hit_is_found(spindle, before):
     model = hit(spindle, before)
-    none = _without_effects(model)
-    found = hit_found(model, none.fit.nuisance, LEAST)
+    found, after = _hit_when_it_was(model)
     assert [d.test.pretrigger for d in found.tests] == pytest.approx([before] * 2, abs=2e-5)
-    after = _without_effects(found)
-    assert none.fit.chi2 / none.fit.count > 1.3
+    before_it = fit(model)
+    assert before_it.chi2 / before_it.count > 1.3
     assert after.fit.chi2 / after.fit.count < 1.1
     assert hit_found(found, after.fit.nuisance, LEAST) is None  # it is told now
 
@@ -54,7 +54,7 @@ def test_a_hit_is_found(spindle, before):
 def test_it_is_not_sought_without_need(spindle, before):
     """Where records have no end, and where they begin with the hit."""
     model = hit(spindle, before)
-    assert hit_found(model, _without_effects(model).fit.nuisance, LEAST) is None
+    assert hit_found(model, fit(model).nuisance, LEAST) is None
 
 
 @pytest.mark.parametrize("times", [1.0, 4.0])
@@ -66,12 +66,12 @@ def test_what_gains_more_than_is_left_out_is_something_else(spindle, times):
     assert (hit_found(model, x, LEAST) is None) == (times > 1)
 
 
-@pytest.mark.parametrize("told", [(0,), pytest.param((), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("told", [(0,), ()])
 def test_tests_may_be_hit_at_times_of_their_own(spindle, told):
     """Where neither tells, and where one does: what is told stays as it is."""
     before = (0.6e-3, 2.2e-3)
     model = hit(spindle, *before, told=told)
-    found = hit_found(model, _without_effects(model).fit.nuisance, LEAST)
+    found, after = _hit_when_it_was(model)
     assert [d.test.pretrigger for d in found.tests] == pytest.approx(before, abs=3e-5)
-    after = _without_effects(found).fit
-    assert after.chi2 / after.count < 1.1
+    assert after.fit.chi2 / after.fit.count < 1.1

@@ -261,7 +261,7 @@ def test_where_no_other_start_can_be_built_the_first_fit_stands(spindle, monkeyp
 
     monkeypatch.setattr("thermospindle.diagnosis.inference.search.fit", fails)
     assert _without_effects(model, 1).fit.chi2 > 1000 * model.tests[0].count
-    assert len(asked) == 4
+    assert len(asked) == 5  # four from afar, and where wider tolerances lead
 
 
 @pytest.mark.slow
