@@ -11,6 +11,7 @@ screening   what a mechanism promises beside a fitted model
 remainder   what an explanation leaves: how far residuals say the same, and the light resonance that would make them
 hypothesis  mechanisms that act together, fitted, with their evidence
 resonance   the model with a light resonance more
+base/       the model without effects, fitted from the drawing or from afar
 singles     mechanisms one at a time: screened, and the promising ones fitted
 pairs       mechanisms that act together
 search      the evidence of every explanation

@@ -8,14 +8,13 @@ from functools import partial
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
+from thermospindle.diagnosis.inference.base.drawn import hit_when_it_was, without_effects
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, settled, widened
 from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, rivals_beside, without_one
-from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import beside, with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
@@ -33,8 +32,7 @@ from thermospindle.diagnosis.inference.singles import (
     of_each_name,
 )
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, with_own_laws
-from thermospindle.diagnosis.parameters.nuisance import BUILD
-from thermospindle.model.parallel import in_parallel, meanwhile, tell
+from thermospindle.model.parallel import in_parallel, meanwhile
 from thermospindle.model.types import Array
 
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
@@ -42,10 +40,6 @@ NEAR = 100.0  # ln evidence behind the best, so far
 UNLIKELY = 5.0  # ln evidence behind the best, of a way to act that need not be told
 GAINED = {1: LITTLE, 2: ENOUGH, 3: PLENTY}  # ln evidence of one effect, of a second and of a third, of which other ways are asked: an effect that is not needed has no way
 RIVALS = 3  # explanations of which other ways are asked, at most: each shares its prior among all that its effects have
-MISSED = 2.0  # times the errors that the model without effects leaves, from which it may have stalled
-OFF = (-20.0, -10.0, -5.0, 5.0, 10.0, 20.0)  # standard deviations by which a build tolerance is off where it then starts
-AFAR = (((1, 3.0), (1, 5.0)), ((4, 3.0), (4, 10.0)))  # how many are, and times as wide as stated they may be; what follows where it stalls still
-FINER = 2  # times that hits which no test tells are sought, each with less else that is left
 WAYS = 8  # in which an effect of these may act too, at most, those that screening promises most of
 
 
@@ -72,7 +66,7 @@ def search(
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or
     beside the best single one; and one that moves with temperature where no effect alone explains them, and it explains more."""
     with meanwhile(partial(with_own_laws, named, model.spindle, [d.condition for d in model.tests]), workers) as own_laws:
-        model, plain = _hit_when_it_was(model, workers)
+        model, plain = hit_when_it_was(model, workers)
         model, none = with_resonance(model, plain, workers) or (model, plain)
         every = [*named, *own_laws(), *free]
     progress("fitted without effects")
@@ -84,7 +78,7 @@ def search(
     before = model
     if len(wider.resonances) > len(model.resonances):
         model = wider
-        none = _without_effects(model, workers)
+        none = without_effects(model, workers)
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
             tried = fit_singles(model, none, every, lambda done: None, workers)  # steps that were counted already
         else:
@@ -119,79 +113,6 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
     """Single mechanisms, with laws of the data's own too, and those that are joined to the best."""
     tried = replace(tried, singles=better([*tried.singles, *by_own_laws(model, none, tried, every, workers)]))
     return tried, joined(model, none, tried.singles, every, tried.most, tried.expected, workers)
-
-
-def _hit_when_it_was(model: CampaignModel, workers: int | None = None) -> tuple[CampaignModel, Hypothesis]:
-    """The model with its tests hit where their lines say, if they do not tell, and it fitted without effects. What a fit misses
-    for that alone is explained by it, and needs no start from afar; and what it explains tells the times of hits the finer."""
-    told, first = model, fit(model, done=tell)
-    if _missed(first):
-        hit = _hit(model, Hypothesis(first, evidence(model, first)))
-        if hit is not None and not _missed(again := fit(hit, done=tell)):
-            told, first = hit, again
-    none = _reached(told, first, workers)
-    for _ in range(FINER):
-        hit = _hit(model, none)
-        if hit is None or _times(hit) == _times(told):
-            break
-        told, none = hit, _without_effects(hit, workers)
-    return told, none
-
-
-def _hit(model: CampaignModel, none: Hypothesis) -> CampaignModel | None:
-    return hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)
-
-
-def _times(model: CampaignModel) -> list[float | None]:
-    return [d.test.pretrigger for d in model.tests]
-
-
-def _without_effects(model: CampaignModel, workers: int | None = None) -> Hypothesis:
-    return _reached(model, fit(model, done=tell), workers)
-
-
-def _reached(model: CampaignModel, first: Fit, workers: int | None) -> Hypothesis:
-    """The fit without effects, or where it stalled a better one from afar, settled."""
-    for ways in AFAR:
-        if _missed(first):
-            found = in_parallel(partial(_from_afar, model), ways, workers)
-            first = min((first, *(f for f in found if f is not None)), key=lambda f: f.cost)
-    h = settled(model, Hypothesis(first, evidence(model, first)))
-    return _by_wider_tolerances(model, h) if _missed(h.fit) else h
-
-
-def _missed(first: Fit) -> bool:
-    """Whether a fit without effects leaves so much that it may have stalled."""
-    return first.chi2 > MISSED**2 * first.count
-
-
-def _by_wider_tolerances(model: CampaignModel, h: Hypothesis) -> Hypothesis:
-    """The model without effects from where tolerances as wide as the data have them lead, if these let peaks find each other which
-    the model's constant errors alone had moved: else a light resonance is taken in for a drawing that is off in several joints."""
-    there = widened(model, h)
-    try:
-        again = fit(model, (), there.fit.point, there.fit.rates, TEMPERS[-1:])
-    except FAILED:
-        return h
-    return max(h, settled(model, Hypothesis(again, evidence(model, again))), key=lambda h: h.evidence.ln)
-
-
-def _from_afar(model: CampaignModel, way: tuple[int, float]) -> Fit | None:
-    """A fit without effects from so many build tolerances, one after the other, as bring peaks nearest, with tolerances so many times as wide
-    until errors are as stated: what moves peaks by many of their widths has no slope to follow from the drawing. Of 88 campaigns of a disk, of
-    a mount that is otherwise, or both, 22 left 3 times the errors and more from the drawing, and light resonances then stood in for these; and
-    of 54 with all tolerances 3 to 12 times as far off as stated 14. From here one does. None where it leads to what cannot be built."""
-    count, wider = way
-    learned, n = Learned({BUILD: wider}, 1.0), len(model.parameters)
-    problem, build = Problem(model.thinned, (), learned), np.eye(n)[: len(model.build)]
-    start = np.zeros(n)
-    for _ in range(count):
-        start = min((start, *(start + off * row for row in build for off in OFF)), key=lambda p: problem.cost(p, TEMPERS[1]))
-    try:
-        near = fit(model, (), start, tempers=TEMPERS[1:-1], learned=learned)
-        return fit(model, (), near.point, near.rates, TEMPERS[-1:])
-    except FAILED:
-        return None
 
 
 def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:

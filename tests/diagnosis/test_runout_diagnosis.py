@@ -120,6 +120,7 @@ def heavy_cage(spindle) -> tuple[Campaign, RunoutDiagnosis]:
     return made, diagnose_runout(spindle, replace(made, tests=made.tests[2:]))
 
 
+@pytest.mark.slow
 def test_with_one_speed_the_cage_and_the_balls_are_not_told_apart_for_certain(spindle, heavy_cage) -> None:
     """Both whirl the hub at fc; only speed tells them apart, and the balls' size is the likelier: a
     cage so heavy is 30 of its standard deviations."""

@@ -11,8 +11,8 @@ import pytest
 from tests.virtual_campaign import drawn, model_of, noisy, truth, virtual_campaign
 from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.response import Response
+from thermospindle.diagnosis.inference.base.drawn import hit_when_it_was
 from thermospindle.diagnosis.inference.fit import fit
-from thermospindle.diagnosis.inference.search import _hit_when_it_was
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Noise
@@ -42,7 +42,7 @@ def hit(spindle, *before, told=(), times=1.0):
 @pytest.mark.parametrize("before", [2.2e-3, pytest.param(0.6e-3, marks=pytest.mark.slow)])
 def test_a_hit_is_found(spindle, before):
     model = hit(spindle, before)
-    found, after = _hit_when_it_was(model)
+    found, after = hit_when_it_was(model)
     assert [d.test.pretrigger for d in found.tests] == pytest.approx([before] * 2, abs=2e-5)
     before_it = fit(model)
     assert before_it.chi2 / before_it.count > 1.3
@@ -72,6 +72,6 @@ def test_tests_may_be_hit_at_times_of_their_own(spindle, told):
     """Where neither tells, and where one does: what is told stays as it is."""
     before = (0.6e-3, 2.2e-3)
     model = hit(spindle, *before, told=told)
-    found, after = _hit_when_it_was(model)
+    found, after = hit_when_it_was(model)
     assert [d.test.pretrigger for d in found.tests] == pytest.approx(before, abs=3e-5)
     assert after.fit.chi2 / after.fit.count < 1.1

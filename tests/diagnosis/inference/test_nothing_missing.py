@@ -145,7 +145,8 @@ def test_a_drawing_that_is_off_is_no_missing_effect(spindle):
     assert "The drawing is off by more than its tolerances" in v.reason
 
 
-@pytest.mark.parametrize(("share", "learned"), [pytest.param(0.0, {0.0}, marks=pytest.mark.slow), (0.1, {0.1})])
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "learned"), [(0.0, {0.0}), (0.1, {0.1})])
 def test_what_temperature_does_to_each_mode_otherwise_is_no_missing_effect(spindle, share, learned):
     """Every mode's change of frequency with temperature off by a tenth of it, alike in all tests:
     blind campaign 2464 was `ball_material` for that, beside which what an effect does might be off,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.hand_made_search import mechanism
-from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, neutral_but, virtual_campaign
+from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.inference import hypothesis, singles
 from thermospindle.diagnosis.inference.evidence import evidence
@@ -19,10 +19,9 @@ from thermospindle.diagnosis.inference.freeform import drifting, free_forms, run
 from thermospindle.diagnosis.inference.hypothesis import EARLY, Hypothesis, Task, settled
 from thermospindle.diagnosis.inference.prior import CHANGING, Learned, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
-from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
-from thermospindle.diagnosis.inference.search import _from_the_drawing, _without_effects, _without_what_does_nothing, search
-from thermospindle.diagnosis.inference.singles import FAR, HIDING, cost_of, fit_singles, fitted_in_steps, lasting
+from thermospindle.diagnosis.inference.search import _from_the_drawing, _without_what_does_nothing, search
+from thermospindle.diagnosis.inference.singles import FAR, HIDING, cost_of, fitted_in_steps, lasting
 from thermospindle.diagnosis.parameters.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.parameters.nuisance import STIFFNESS
 from thermospindle.model.machine import Condition
@@ -220,59 +219,6 @@ def test_shapes_are_known_in_their_own_units(spindle):
         assert free
         for k, q in enumerate(m.shape):
             assert errors[k] == (pytest.approx(q.prior_sd, rel=0.3) if k in free else 0.0), (name, q.name)
-
-
-def of_a_softer_mount(spindle, tests, seed, softer, step, *beside):
-    """A model of tests of a mount that is softer than drawn, so much that from the drawing its peaks have no slope to follow."""
-    hidden = neutral_but(*beside, ("mount_compliance", {"compliance": softer, "thermal_share": 0.0}))
-    return model_of(spindle, virtual_campaign(spindle, tests, seed, hidden, drawn(spindle, len(tests), seed), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, step)))
-
-
-@pytest.mark.slow
-def test_effects_do_not_stall_where_a_drawing_is_far_off(spindle):
-    """One that does little arrives where the model without effects has: 60 times the errors were left beside it."""
-    tests = (Condition(20.0), Condition(40.0, 7200.0 * RPM))
-    model = of_a_softer_mount(spindle, tests, 7, 0.5, 24.0, ("thermal_gradient", {"scale": 4.0}))
-    found = fit_singles(model, _without_effects(model, 1), variants(effect("window_damping"))[:1], lambda done: None, 1).singles
-    assert [h.names for h in found] == [("window_damping",)]
-    assert found[0].fit.chi2 < 1.3 * found[0].fit.count
-
-
-def test_a_mount_far_from_the_drawing_is_no_light_resonance(spindle):
-    """90 times the errors were left, and a light resonance stood in for what is one build tolerance."""
-    model = of_a_softer_mount(spindle, TESTS[:1], 112, 0.46, 48.0)
-    none = _without_effects(model, 1)
-    assert none.fit.chi2 < 1.3 * none.fit.count
-    assert with_resonance(model, none, 1) is None
-    (stiffness,) = [v for q, v in zip(model.parameters, none.evidence.mean, strict=True) if q.name == "mount axial stiffness"]
-    assert stiffness < -5.0
-
-
-def test_where_no_other_start_can_be_built_the_first_fit_stands(spindle, monkeypatch):
-    """Of five_bearing, every tolerance 12 times as far off as it may be, one start ended in a LinAlgError."""
-    model = of_a_softer_mount(spindle, TESTS[:1], 112, 0.46, 48.0)
-    asked: list[object] = []
-
-    def fails(model, *args, **kinds):
-        if args or kinds.keys() - {"done"}:
-            asked.append(kinds)
-            raise np.linalg.LinAlgError("SVD did not converge")
-        return fit(model)
-
-    monkeypatch.setattr("thermospindle.diagnosis.inference.search.fit", fails)
-    assert _without_effects(model, 1).fit.chi2 > 1000 * model.tests[0].count
-    assert len(asked) == 5  # four from afar, and where wider tolerances lead
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("seed", "factor"), [(303, 10.0), (402, 12.0)])
-def test_a_drawing_that_is_far_off_everywhere_is_fitted(spindle, seed, factor):
-    """Every tolerance is `factor` times as far off as it may be: 50 times the errors were left."""
-    far = drawn(spindle, 1, seed)
-    far = replace(far, build=np.clip(factor * far.build, -0.6, 1.5))
-    model = model_of(spindle, virtual_campaign(spindle, TESTS[:1], seed, [], far, responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 24.0)))
-    none = _without_effects(model, 1)
-    assert none.fit.chi2 < 1.3 * none.fit.count
 
 
 def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):

@@ -134,6 +134,7 @@ def test_noise_alone_has_no_modes():
     assert len(extract(WIDE, frf - 1, np.ones(frf.shape)).frequency) == 0
 
 
+@pytest.mark.slow
 def test_noise_that_is_not_known_is_taken_from_the_lines():
     frequency, damping, _ = (x[:8] for x in eigen(*spindle(), sensors()))
     modes = extract(WIDE, noisy(reference(WIDE), 5)[0])
