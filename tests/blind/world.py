@@ -57,6 +57,7 @@ class World:
     own_orbits: bool = False  # each ball as fast as it rolls by itself, and not with its cage
     hysteretic: float = 0.0  # share of what is lost that does not grow with frequency: of a complex stiffness, of FRFs that come line by line
     masses: tuple[float, ...] = ()  # by what shares bodies and shafts have their mass otherwise (`distributed`)
+    off: tuple[tuple[str, float], ...] = ()  # build parameters, and how many times what the scene says they are
 
 
 @dataclass(frozen=True)
