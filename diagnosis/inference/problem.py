@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear
 
 from thermospindle.diagnosis.forward.derivatives import Derivatives, column, nuisance_jacobian
@@ -73,7 +74,7 @@ class Problem:
         `longest` one: the quadratic of what is limited alone, all else following it, is solved between bounds."""
         limited = np.isfinite(self.low) | np.isfinite(self.high)
         free, move = ~limited, np.zeros(self.length)
-        follows = np.linalg.solve(normal[np.ix_(free, free)], np.column_stack([slope[free], normal[np.ix_(free, limited)]]))
+        follows = _solved(normal[np.ix_(free, free)], np.column_stack([slope[free], normal[np.ix_(free, limited)]]))
         if limited.any():
             left = np.column_stack([slope[limited], normal[np.ix_(limited, limited)]]) - normal[np.ix_(limited, free)] @ follows
             factor = np.linalg.cholesky(left[:, 1:])
@@ -187,6 +188,14 @@ class Problem:
         return np.inf if residuals is None else temper**2 * sum(float(r @ r) for r in residuals) + float(p @ self.precision @ p)
 
 
+def _solved(normal: Array, sides: Array) -> Array:
+    """normal^-1 sides (n, k), of a symmetric matrix (n, n) that is positive, but for rounding."""
+    try:
+        return np.asarray(cho_solve(cho_factor(normal, overwrite_a=True, check_finite=False), sides, check_finite=False))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.solve(normal, sides))
+
+
 def built(residual: Callable[[int], Array], tests: int) -> list[Array] | None:
     """`residual` of every test; None where no spindle can be built."""
     try:
@@ -199,13 +208,14 @@ def built(residual: Callable[[int], Array], tests: int) -> list[Array] | None:
 class Linearisation:
     """Derivatives of all tests at one point: information J^T J, and gradients J^T r of residuals there or near."""
 
-    def __init__(self, length: int, rows: Sequence[tuple[Array, Derivatives]]) -> None:
+    def __init__(self, length: int, rows: Sequence[tuple[Array, Derivatives]], own: Sequence[Array] | None = None) -> None:
+        """Of a parameter vector of some `length` and the residuals and derivatives of every test, whose products are their `own` if known."""
         self.length, self.rows = length, rows
         self.residuals = [r for r, _ in rows]
         self.information: Array = np.zeros((length, length))
-        self._own = [found.information for _, found in rows]
-        for own, (_, found) in zip(self._own, rows, strict=True):
-            self.information[np.ix_(found.numbers, found.numbers)] += own
+        self._own = [found.information for _, found in rows] if own is None else own
+        for of_test, (_, found) in zip(self._own, rows, strict=True):
+            self.information[np.ix_(found.numbers, found.numbers)] += of_test
 
     @property
     def by_test(self) -> list[Array]:
@@ -219,7 +229,9 @@ class Linearisation:
         """The same with some parameters held where they are."""
         if not len(held):
             return self
-        return Linearisation(self.length, [(r, found.by(~np.isin(found.numbers, held))) for r, found in self.rows])
+        kept = [~np.isin(found.numbers, held) for _, found in self.rows]
+        rows = [(r, found.by(k)) for k, (r, found) in zip(kept, self.rows, strict=True)]
+        return Linearisation(self.length, rows, [own[np.ix_(k, k)] for k, own in zip(kept, self._own, strict=True)])
 
     @cached_property
     def chi2(self) -> float:
@@ -236,6 +248,14 @@ class Linearisation:
         return np.asarray(temper**2 * np.sum(self.gradients(at.residuals), axis=0) + problem.precision @ at.p)
 
     def gradients(self, residuals: Sequence[Array]) -> list[Array]:
+        """J^T r (n,) of every test, of residuals there or near."""
+        return self._gradients if residuals is self.residuals else self._gradients_of(residuals)
+
+    @cached_property
+    def _gradients(self) -> list[Array]:
+        return self._gradients_of(self.residuals)
+
+    def _gradients_of(self, residuals: Sequence[Array]) -> list[Array]:
         gradients = [np.zeros(self.length) for _ in self.rows]
         for gradient, r, (_, found) in zip(gradients, residuals, self.rows, strict=True):
             gradient[found.numbers] = found.products(r)
