@@ -11,7 +11,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit, rated
-from thermospindle.diagnosis.inference.prior import Learned, steady
+from thermospindle.diagnosis.inference.prior import Learned, steady, tolerances_of
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, shared
@@ -112,17 +112,17 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
     """A fit; with `afresh` from where a `scan` leads while errors are larger still, if that costs less. Once more with errors enlarged
     where it did not reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
     mechanisms, starts = task.mechanisms, task.starts
-    prior = steady(expected, mechanisms)
+    prior, wide = steady(expected, mechanisms), tolerances_of(expected) > 1.0
     try:
         if afresh:
             before = TEMPERS[1 : TEMPERS.index(tempers[0])]
             starts = (*starts, fit(model, mechanisms, scan(model, mechanisms), rates, before, learned=prior).point)
         found = fit(model, mechanisms, starts, rates, tempers, learned=prior, beaten=beaten)
-        reached = Hypothesis(found, evidence(model, found))
+        reached = Hypothesis(found, evidence(model, found, wide=wide))
         if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
             again = fit(model, mechanisms, as_drawn(model, task.starts[0]), rates, TEMPERS[1:], learned=prior, beaten=beaten)
             if again.cost < found.cost:
-                reached = Hypothesis(again, evidence(model, again))
+                reached = Hypothesis(again, evidence(model, again, wide=wide))
         return None if reached.evidence.rounded else reached.light
     except FAILED:
         return None

@@ -67,11 +67,16 @@ CHANGING = (*DRIFTING, kinds_of.CHANGE)
 
 
 def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
-    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, bearings change
-    otherwise, thermal motions and a drawing are off, is left as it is on paper, so that none takes what the mechanisms should explain."""
-    on_paper = (*CHANGING, kinds_of.EXPANSION, kinds_of.BUILD)
+    """What was learned of constant discrepancies, of gains and, where they were, of build tolerances, for a fit of `mechanisms`: how much modes
+    drift, bearings change otherwise and thermal motions are off, is left as it is on paper, so that none takes what the mechanisms should explain."""
+    on_paper = (*CHANGING, kinds_of.EXPANSION)
     sizes = {kind: REFERENCE[kind] if kind in on_paper else max(REFERENCE[kind], size) for kind, size in learned.sizes.items() if kind in REFERENCE}
     return as_stated(sizes, mechanisms)
+
+
+def tolerances_of(learned: Learned) -> float:
+    """How many times as wide as stated build tolerances were learned to be."""
+    return learned.sizes.get(kinds_of.BUILD, 1.0)
 
 
 def undrifted(learned: Learned) -> Learned:

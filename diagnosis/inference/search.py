@@ -15,6 +15,7 @@ from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, settled, widened
 from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, rivals_beside, without_one
+from thermospindle.diagnosis.inference.prior import tolerances_of
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import beside, with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
@@ -101,6 +102,9 @@ def search(
     none = _without_what_does_nothing(model, none, at_the_end)
     anew = dict(zip(map(id, finalists), at_the_end, strict=True))
     ranked = [anew.get(id(h), h) for h in found]
+    if all(tolerances_of(h.evidence.learned) > 1.0 for h in (none, max([none, *ranked], key=lambda h: h.evidence.ln))):
+        tried, beside_them = _beside_wider_tolerances(model, none, every, workers)
+        ranked = better([*at_the_end, *beside_them])
     ranked += _other_ways(model, [none, *ranked], every, tried, workers)
     progress("the best fitted anew")
     laws = {m.name: m for m in reversed(named)}
@@ -113,6 +117,18 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
     """Single mechanisms, with laws of the data's own too, and those that are joined to the best."""
     tried = replace(tried, singles=better([*tried.singles, *by_own_laws(model, none, tried, every, workers)]))
     return tried, joined(model, none, tried.singles, every, tried.most, tried.expected, workers)
+
+
+def _beside_wider_tolerances(model: CampaignModel, none: Hypothesis, every: Sequence[Mechanism], workers: int | None) -> tuple[Singles, list[Hypothesis]]:
+    """Effects sought once more, where the likeliest explanation has tolerances wider than stated, as `none` has: the
+    drawing is off, and what was found beside tolerances as stated is what stands in for that best, and as far behind as it does not."""
+    tried, pairs = _together(model, none, fit_singles(model, none, every, lambda done: None, workers), every, workers)
+    found = better([*tried.singles, *pairs])
+    found = better([*found, *rivals_beside(model, found, tried, workers)])
+    finalists = _finalists(found)
+    ended = _ended(model, max((h.evidence.ln for h in found), default=-np.inf), finalists, workers)
+    anew = dict(zip(map(id, finalists), ended, strict=True))
+    return tried, [anew.get(id(h), h) for h in found]
 
 
 def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:
@@ -144,7 +160,8 @@ def _at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:
 def _settled_at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:
     if h.mechanisms:  # without any it is settled
         h = settled(model, h, best)
-        if not h.free and any(m.shape for m in h.mechanisms) and farthest_tolerance(model, h.fit.point) > STRAINED:
+        drawn = tolerances_of(h.evidence.learned) == 1.0
+        if drawn and not h.free and any(m.shape for m in h.mechanisms) and farthest_tolerance(model, h.fit.point) > STRAINED:
             h = _from_the_drawing(model, h)
     return widened(model, h, best - FAR)
 

@@ -22,7 +22,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.freeform import as_told_by
 from thermospindle.diagnosis.inference.hypothesis import EARLY, LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, scan
-from thermospindle.diagnosis.inference.prior import CHANGING, Learned, steady, undrifted
+from thermospindle.diagnosis.inference.prior import CHANGING, Learned, steady, tolerances_of, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import with_more
 from thermospindle.diagnosis.inference.screening import Screened, screen
@@ -59,14 +59,15 @@ def fit_singles(
     model: CampaignModel, none: Hypothesis, mechanisms: Sequence[Mechanism], progress: Callable[[str], None], workers: int | None
 ) -> Singles:
     learned = none.evidence.learned
-    misfit = strained(none)
+    misfit, drawn = strained(none), tolerances_of(learned) == 1.0
     expected = steady(learned)
+    about, temper, far = none.fit, 1.0, False
     if misfit:
-        about, temper = fit(model, tempers=TEMPERS[: EARLY + 1], learned=expected), TEMPERS[EARLY]
-    else:
-        about, temper = none.fit, 1.0
-    if far := misfit and far_off(model, about):  # it may have stalled where the model without effects has not
-        about = min(about, fit(model, (), none.fit.point, none.fit.rates, (temper,), expected), key=lambda f: f.cost)
+        temper = TEMPERS[EARLY]
+        there = partial(fit, model, (), none.fit.point, none.fit.rates, (temper,), expected)
+        about = fit(model, tempers=TEMPERS[: EARLY + 1], learned=expected) if drawn else there()
+        if far := drawn and far_off(model, about):  # it may have stalled where the model without effects has not
+            about = min(about, there(), key=lambda f: f.cost)
     with meanwhile(partial(cost_of, model, none, expected), workers) as most_of:
         looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, mechanisms, workers)
         rankings = [looked]
@@ -176,11 +177,12 @@ def lasting(
 ) -> list[Hypothesis]:
     """Effects that are the same in every test beside an explanation, from a scan of sizes with all else as
     drawn: constant discrepancies of the model or strained tolerances stand in for them, and beside those
-    screening sees nothing. Followed to the end is what gains something while errors are still enlarged, and keeps up with the best."""
+    screening sees nothing; from where the model is, if its tolerances are wider than stated. Followed to the end is what gains something while errors are still enlarged, and keeps up with the best."""
     n = len(model.parameters)
-    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean) < STRAINED:
+    wider = tolerances_of(lead.evidence.learned)
+    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean) < STRAINED * wider:
         return []
-    own = as_drawn(model, lead.fit.point)
+    own = as_drawn(model, lead.fit.point) if wider == 1.0 else lead.fit.point
     drawn = {m.name: m for m in reversed(mechanisms) if m.lasting and m.kind == "law" and m.name not in lead.names}
     tasks = [
         Task((*lead.mechanisms, m), tuple(np.concatenate([own, at[n:]]) for at in scan(model, (m,))[1:]), -np.inf) for m in drawn.values()
