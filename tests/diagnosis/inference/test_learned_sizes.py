@@ -6,12 +6,14 @@ import pytest
 
 from tests.diagnosis.inference.toy import toy
 from thermospindle.diagnosis.inference.evidence import Learned, evidence
+from thermospindle.diagnosis.inference.prior import REFERENCE, steady
 from thermospindle.diagnosis.parameters.nuisance import (
     BUILD,
     DAMPING,
     DRIFT,
     EXPANSION,
     STIFFNESS,
+    STIFFNESS_DRIFT,
 )
 from thermospindle.diagnosis.parameters.sizes import FARTHER, WIDER, finer
 
@@ -44,6 +46,12 @@ def test_errors_larger_than_stated_are_learned():
         assert evidence(made.model, made.fit).learned.errors == pytest.approx(1.5, rel=0.1)
         fine = toy(seed, 0.0, rows=200)
         assert evidence(fine.model, fine.fit).learned.errors < 1.1
+
+
+def test_tolerances_that_are_wider_stay_so_where_effects_are_sought_beside_them():
+    """What drifts, or thermal motions that are off, does not: it may be the effect."""
+    beside = steady(Learned({BUILD: 4.0, EXPANSION: 3.0, STIFFNESS_DRIFT: 1e-3, STIFFNESS: 1e-2}, 1.3)).sizes
+    assert beside == {BUILD: 4.0, EXPANSION: REFERENCE[EXPANSION], STIFFNESS_DRIFT: REFERENCE[STIFFNESS_DRIFT], STIFFNESS: 1e-2}
 
 
 @pytest.mark.parametrize(("build", "times"), [(1.0, {1.0}), (10.0, {4.0, 8.0})])
