@@ -110,7 +110,8 @@ def fitted(
 
 def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, beaten: float, task: Task) -> Hypothesis | None:
     """A fit; with `afresh` from where a `scan` leads while errors are larger still, if that costs less. Once more with errors enlarged
-    where it did not reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
+    where it did not reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled. Not
+    beside a drawing that is off, to which enlarged errors would lead back."""
     mechanisms, starts = task.mechanisms, task.starts
     prior, wide = steady(expected, mechanisms), tolerances_of(expected) > 1.0
     try:
@@ -119,10 +120,10 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
             starts = (*starts, fit(model, mechanisms, scan(model, mechanisms), rates, before, learned=prior).point)
         found = fit(model, mechanisms, starts, rates, tempers, learned=prior, beaten=beaten)
         reached = Hypothesis(found, evidence(model, found, wide=wide))
-        if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
+        if found.temper == 1.0 and not wide and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
             again = fit(model, mechanisms, as_drawn(model, task.starts[0]), rates, TEMPERS[1:], learned=prior, beaten=beaten)
             if again.cost < found.cost:
-                reached = Hypothesis(again, evidence(model, again, wide=wide))
+                reached = Hypothesis(again, evidence(model, again))
         return None if reached.evidence.rounded else reached.light
     except FAILED:
         return None

@@ -182,15 +182,15 @@ def lasting(
     wider = tolerances_of(lead.evidence.learned)
     if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean) < STRAINED * wider:
         return []
-    own = as_drawn(model, lead.fit.point) if wider == 1.0 else lead.fit.point
+    own, tempers = (as_drawn(model, lead.fit.point), TEMPERS[:-1]) if wider == 1.0 else (lead.fit.point, TEMPERS[-2:-1])
     drawn = {m.name: m for m in reversed(mechanisms) if m.lasting and m.kind == "law" and m.name not in lead.names}
     tasks = [
         Task((*lead.mechanisms, m), tuple(np.concatenate([own, at[n:]]) for at in scan(model, (m,))[1:]), -np.inf) for m in drawn.values()
     ]
     if not tasks:
         return []
-    about = fit(model, lead.mechanisms, (own, lead.fit.point), tempers=TEMPERS[:-1], learned=steady(expected, lead.mechanisms))
-    early = fitted(model, tasks, TEMPERS[:-1], about, most, expected, workers)
+    about = fit(model, lead.mechanisms, (own, lead.fit.point), tempers=tempers, learned=steady(expected, lead.mechanisms))
+    early = fitted(model, tasks, tempers, about, most, expected, workers)
     least = max([evidence(model, about).ln + LITTLE, *(h.evidence.ln - BEHIND for h in early)])
     tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if h.evidence.ln > least]
     return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers, beaten=lead.fit.cost)
