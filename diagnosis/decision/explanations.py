@@ -154,13 +154,14 @@ def discount(best: Hypothesis, same: Overlap) -> float:
 def coarsening(best: Hypothesis, same: Overlap) -> float:
     """What ln evidence is divided by where what the best explanation leaves shows the model to be wrong: `COARSE`, or one.
 
-    Residuals that are too large, or say the same in one test as in another, and several effects of which none has its law
-    tell of something that is not in the model, and evidence that counts lines as if nothing were missing is too sure (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened
-    posterior is a power of the likelihood). Residuals no larger than stated that say the same over lines of one test
-    are noise that a window or a leak has spread over them, of which there is less: `Overlap.inflation` counts that.
-    Constant errors of modes that are learned are in the model, with what they make wrong in an effect (`ACTION`); so are tolerances
-    wider than stated, beside which effects are sought: of eight blind campaigns of 3581 to 3668 whose scene is off by a tenth to six
-    tenths, and that hide nothing, no explanation gained more than 2.5, and a compliance of 25 standard errors by 31 was none. Others judge it.
+    Residuals that are too large, or say the same in one test as in another, and several effects of which none has its
+    law tell of something that is not in the model, and evidence that counts lines as if nothing were missing is too
+    sure (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened posterior is a power of the likelihood).
+    Residuals no larger than stated that say the same over lines of one test are noise that a window or a leak has spread
+    over them, of which there is less: `Overlap.inflation` counts that. Constant errors of modes that are learned are in the
+    model, with what they make wrong in an effect (`ACTION`); so are tolerances wider than stated, beside which effects are
+    sought: of six blind campaigns of 3581 to 3668 whose scene is off by a tenth to six tenths and that hide nothing no
+    explanation gained more than 2.5, and a compliance of 25 standard errors, by 31, was *none*. Others judge it.
     """
     learned = best.evidence.learned
     lawless = len(best.mechanisms) > 1 and not best.free and min(learned.departures) >= DEPARTS

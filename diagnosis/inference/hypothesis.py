@@ -179,6 +179,8 @@ def settled(model: CampaignModel, h: Hypothesis, best: float = -np.inf) -> Hypot
 def widened(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Hypothesis:
     """With build tolerances wider than stated, where that is likelier, and promises the `least` ln evidence that counts:
     a drawing that is off. Nothing is sought with them at first, for they would take what is missing before anything is found."""
+    if kinds_of.BUILD in h.evidence.learned.sizes:  # of an explanation that was sought with them
+        return h
     wide = evidence(model, h.fit, wide=True)
     if wide.learned.sizes[kinds_of.BUILD] == 1.0 or wide.ln < least:
         return h

@@ -177,7 +177,8 @@ def lasting(
 ) -> list[Hypothesis]:
     """Effects that are the same in every test beside an explanation, from a scan of sizes with all else as
     drawn: constant discrepancies of the model or strained tolerances stand in for them, and beside those
-    screening sees nothing; from where the model is, if its tolerances are wider than stated. Followed to the end is what gains something while errors are still enlarged, and keeps up with the best."""
+    screening sees nothing; from where the model is, if its tolerances are wider than stated. Followed to
+    the end is what gains something while errors are still enlarged, and keeps up with the best."""
     n = len(model.parameters)
     wider = tolerances_of(lead.evidence.learned)
     if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean) < STRAINED * wider:
@@ -191,7 +192,7 @@ def lasting(
         return []
     about = fit(model, lead.mechanisms, (own, lead.fit.point), tempers=tempers, learned=steady(expected, lead.mechanisms))
     early = fitted(model, tasks, tempers, about, most, expected, workers)
-    least = max([evidence(model, about).ln + LITTLE, *(h.evidence.ln - BEHIND for h in early)])
+    least = max([evidence(model, about, wide=wider > 1.0).ln + LITTLE, *(h.evidence.ln - BEHIND for h in early)])
     tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if h.evidence.ln > least]
     return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers, beaten=lead.fit.cost)
 
