@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import softmax
 
 from thermospindle.diagnosis.inference.gaussian import CANNOT, impossible, opposite
-from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis, off_as_drawn
 from thermospindle.diagnosis.inference.remainder import SMALL, Overlap
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.diagnosis.parameters.mechanism import Mechanism
@@ -96,8 +96,8 @@ def _as_unknown(h: Hypothesis) -> Hypothesis:
 
 
 def explanations(found: Search, same: Overlap) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
-    """Explanations of the catalogue and free ones, with the most probable first, and the
-    probability of nothing missing, where the best leaves residuals that say the `same`."""
+    """Explanations of the catalogue and free ones, with the most probable first, and the probability of nothing
+    missing, a drawing that is off among it, where the best leaves residuals that say the `same`."""
     free_count, named_count = (
         len({s.mechanism.name for s in found.screened if s.mechanism.free == free and s.visibility > 0}) or 1 for free in (True, False)
     )
@@ -112,9 +112,10 @@ def explanations(found: Search, same: Overlap) -> tuple[tuple[Candidate, ...], t
     rows = [(h, _prior(h, named_count, free_count, either, ways) + (w - base) / by) for h, w in values]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
-    every = [_candidate(same_names, base, float(total)) for same_names in _by_names(rows)]
-    every += [Candidate(h, h.names, True, h.evidence.ln - base, 0.0) for h in named_as]
-    none = float(np.exp(next(w for h, w in rows if not h.mechanisms) - total))
+    drawing = [h for h, _ in rows if h.mechanisms and off_as_drawn(found.model, h) == set(h.names)]
+    every = [_candidate(same_names, base, float(total)) for same_names in _by_names([row for row in rows if row[0] not in drawing])]
+    every += [Candidate(h, h.names, True, h.evidence.ln - base, 0.0) for h in (*named_as, *drawing)]
+    none = float(sum(np.exp(w - total) for h, w in rows if not h.mechanisms or h in drawing))
     return likelier_first(c for c in every if not c.free), likelier_first(c for c in every if c.free), none
 
 

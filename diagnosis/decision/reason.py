@@ -8,8 +8,7 @@ from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, likeliest, named_part
 from thermospindle.diagnosis.decision.loss import NEGLIGIBLE, in_all
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.inference.gaussian import apart_by
-from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.hypothesis import LITTLE, SAME, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
 from thermospindle.diagnosis.inference.resonance import moving, shown
 from thermospindle.diagnosis.inference.search import Search
@@ -21,7 +20,6 @@ from thermospindle.model.errors import listed
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 UNBUILT = "the drawing"  # which nothing that is built so explains
 HARDLY = 0.8  # of what is left of conditions left out, from which that is no less
-SAME = 3.0  # errors of their difference, within which sizes are the same
 MOVING = "a light resonance"  # whose frequency changes with temperature
 LEFT = "what is left"  # that changes, and tells of something else
 OFF, NAMED = 2.0, 4  # stated standard deviations from which a tolerance is said to be off, and how many of these are named
@@ -62,7 +60,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             h = free[0].hypothesis
             forms = [f"what {m.name} does" if m.beyond else m.name for m in h.mechanisms if m.free]
             beyond = ", beyond its physical limits" if any(m.beyond for m in h.mechanisms) else ""
-            drift = "differ from the drawing, by as much in every test" if _same_in_all(h) else "drift"
+            drift = "differ from the drawing, by as much in every test" if h.same_in_all else "drift"
             beside = f" beside {' and '.join(named_part(free[0]))}" if named_part(free[0]) else ""
             place = f"{' and '.join(forms)} would have to {drift}{beyond}{beside} ({free[0].delta_evidence:.0f} in ln evidence)"
             place += _impossible(found, free[0].names)
@@ -108,12 +106,6 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
     law = f" with a law that is fitted freely{whose}{before_own}" if own else ""
     return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, all else together has a probability of {rest:z.1%}{beside}{instead}{checked}{disagreement}."
-
-
-def _same_in_all(h: Hypothesis) -> bool:
-    """Whether what is free in an explanation is as much in every test, of two or more: an offset, and no drift."""
-    rows = [(a, c) for m, a, c in zip(h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, strict=True) if m.free]
-    return all(len(a) > 1 and np.all(np.abs(a) > SAME * np.sqrt(np.diag(c))) and apart_by(a, c).max() <= SAME for a, c in rows)
 
 
 def _impossible(found: Search, drifting: Names) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit, rated
+from thermospindle.diagnosis.inference.gaussian import apart_by
 from thermospindle.diagnosis.inference.prior import Learned, steady, tolerances_of
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
@@ -24,6 +25,7 @@ STRAIN = 1.02  # times the errors, from which the model without effects leaves a
 REFITS = 2  # at most
 PLENTY = 12.0  # ln evidence that anything more must promise where no misfit is left
 DEPARTS = 0.3  # of the size from test to test, from which a law does not hold
+SAME = 3.0  # errors of their difference, within which sizes are the same
 LITTLE = 2.0  # ln evidence that a screened mechanism must promise
 
 
@@ -82,6 +84,12 @@ class Hypothesis:
         standard deviations; nothing where there are none."""
         rows = zip(self.mechanisms, self.fit.shapes, strict=True)
         return max((abs(u - q.neutral) / q.prior_sd for m, row in rows for q, u in zip(m.shape, row, strict=True)), default=0.0)
+
+    @property
+    def same_in_all(self) -> bool:
+        """Whether what is free is as much in every test, of two or more: an offset, and no drift."""
+        rows = [(a, c) for m, a, c in zip(self.mechanisms, self.evidence.sizes, self.evidence.size_covariance, strict=True) if m.free]
+        return all(len(a) > 1 and np.all(np.abs(a) > SAME * np.sqrt(np.diag(c))) and apart_by(a, c).max() <= SAME for a, c in rows)
 
     @property
     def excess(self) -> float:
@@ -174,6 +182,12 @@ def settled(model: CampaignModel, h: Hypothesis, best: float = -np.inf) -> Hypot
         if (h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE) or h.evidence.ln < best - PLENTY:
             break
     return h
+
+
+def off_as_drawn(model: CampaignModel, h: Hypothesis) -> frozenset[str]:
+    """Of an explanation the free forms that say no more than that the drawing is off: of what has a build tolerance, by as much in every test."""
+    tolerances = {q.name for q in model.parameters if q.kind == kinds_of.BUILD}
+    return frozenset(m.name for m in h.mechanisms if m.free and m.name in tolerances and h.same_in_all)
 
 
 def widened(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Hypothesis:

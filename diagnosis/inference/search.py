@@ -13,7 +13,18 @@ from thermospindle.diagnosis.inference.base.drawn import hit_when_it_was, withou
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
-from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, settled, widened
+from thermospindle.diagnosis.inference.hypothesis import (
+    LITTLE,
+    PLENTY,
+    STRAIN,
+    Hypothesis,
+    Task,
+    as_drawn,
+    fitted,
+    off_as_drawn,
+    settled,
+    widened,
+)
 from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, rivals_beside, without_one
 from thermospindle.diagnosis.inference.prior import tolerances_of
 from thermospindle.diagnosis.inference.problem import Problem
@@ -102,7 +113,8 @@ def search(
     none = _without_what_does_nothing(model, none, at_the_end)
     anew = dict(zip(map(id, finalists), at_the_end, strict=True))
     ranked = [anew.get(id(h), h) for h in found]
-    if all(tolerances_of(h.evidence.learned) > 1.0 for h in (none, max([none, *ranked], key=lambda h: h.evidence.ln))):
+    best = max((h for h in (none, *ranked) if not off_as_drawn(model, h)), key=lambda h: h.evidence.ln)
+    if all(tolerances_of(h.evidence.learned) > 1.0 for h in (none, best)):
         tried, beside_them = _beside_wider_tolerances(model, none, every, workers)
         ranked = better([*at_the_end, *beside_them])
     ranked += _other_ways(model, [none, *ranked], every, tried, workers)
@@ -120,7 +132,7 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
 
 
 def _beside_wider_tolerances(model: CampaignModel, none: Hypothesis, every: Sequence[Mechanism], workers: int | None) -> tuple[Singles, list[Hypothesis]]:
-    """Effects sought once more, where the likeliest explanation has tolerances wider than stated, as `none` has: the
+    """Effects sought once more, where the likeliest explanation, but for what says that of one part, has tolerances wider than stated, as `none` has: the
     drawing is off, and what was found beside tolerances as stated is what stands in for that best, and as far behind as it does not."""
     tried, pairs = _together(model, none, fit_singles(model, none, every, lambda done: None, workers), every, workers)
     found = better([*tried.singles, *pairs])
