@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import softmax
 
 from thermospindle.diagnosis.inference.gaussian import CANNOT, impossible, opposite
-from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis, off_as_drawn
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis, offsets_of_drawing
 from thermospindle.diagnosis.inference.remainder import SMALL, Overlap
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.diagnosis.parameters.mechanism import Mechanism
@@ -112,7 +112,7 @@ def explanations(found: Search, same: Overlap) -> tuple[tuple[Candidate, ...], t
     rows = [(h, _prior(h, named_count, free_count, either, ways) + (w - base) / by) for h, w in values]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
-    drawing = [h for h, _ in rows if h.mechanisms and off_as_drawn(found.model, h) == set(h.names)]
+    drawing = [h for h, _ in rows if h.mechanisms and offsets_of_drawing(found.model, h) == set(h.names)]
     every = [_candidate(same_names, base, float(total)) for same_names in _by_names([row for row in rows if row[0] not in drawing])]
     every += [Candidate(h, h.names, True, h.evidence.ln - base, 0.0) for h in (*named_as, *drawing)]
     none = float(sum(np.exp(w - total) for h, w in rows if not h.mechanisms or h in drawing))

@@ -9,6 +9,7 @@ from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, 
 from thermospindle.diagnosis.decision.loss import NEGLIGIBLE, in_all
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, SAME, STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.prior import tolerances_of
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
 from thermospindle.diagnosis.inference.resonance import moving, shown
 from thermospindle.diagnosis.inference.search import Search
@@ -140,7 +141,7 @@ def _moves(model: CampaignModel, r: Resonance) -> str:
 def of_tolerances(model: CampaignModel, best: Hypothesis, explained: bool = True) -> str:
     """What of the drawing is off by more than the scene's tolerances, where these are taken wider
     than stated; where the data are not `explained`, that may be something else."""
-    times = best.evidence.learned.sizes.get(kinds_of.BUILD, 1.0)
+    times = tolerances_of(best.evidence.learned)
     if times == 1.0:
         return ""
     build = [(float(m), q) for m, q in zip(best.evidence.mean, model.parameters, strict=False) if q.kind == kinds_of.BUILD]

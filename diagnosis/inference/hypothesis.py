@@ -184,7 +184,7 @@ def settled(model: CampaignModel, h: Hypothesis, best: float = -np.inf) -> Hypot
     return h
 
 
-def off_as_drawn(model: CampaignModel, h: Hypothesis) -> frozenset[str]:
+def offsets_of_drawing(model: CampaignModel, h: Hypothesis) -> frozenset[str]:
     """Of an explanation the free forms that say no more than that the drawing is off: of what has a build tolerance, by as much in every test."""
     tolerances = {q.name for q in model.parameters if q.kind == kinds_of.BUILD}
     return frozenset(m.name for m in h.mechanisms if m.free and m.name in tolerances and h.same_in_all)

@@ -21,7 +21,7 @@ from thermospindle.diagnosis.inference.hypothesis import (
     Task,
     as_drawn,
     fitted,
-    off_as_drawn,
+    offsets_of_drawing,
     settled,
     widened,
 )
@@ -111,9 +111,8 @@ def search(
     finalists = _finalists(found)
     none, *at_the_end = _ended(model, max((h.evidence.ln for h in found), default=-np.inf), [none, *finalists], workers)
     none = _without_what_does_nothing(model, none, at_the_end)
-    anew = dict(zip(map(id, finalists), at_the_end, strict=True))
-    ranked = [anew.get(id(h), h) for h in found]
-    best = max((h for h in (none, *ranked) if not off_as_drawn(model, h)), key=lambda h: h.evidence.ln)
+    ranked = _with_anew(found, finalists, at_the_end)
+    best = max((h for h in (none, *ranked) if not offsets_of_drawing(model, h)), key=lambda h: h.evidence.ln)
     if all(tolerances_of(h.evidence.learned) > 1.0 for h in (none, best)):
         tried, beside_them = _beside_wider_tolerances(model, none, every, workers)
         ranked = better([*at_the_end, *beside_them])
@@ -132,15 +131,19 @@ def _together(model: CampaignModel, none: Hypothesis, tried: Singles, every: Seq
 
 
 def _beside_wider_tolerances(model: CampaignModel, none: Hypothesis, every: Sequence[Mechanism], workers: int | None) -> tuple[Singles, list[Hypothesis]]:
-    """Effects sought once more, where the likeliest explanation, but for what says that of one part, has tolerances wider than stated, as `none` has: the
-    drawing is off, and what was found beside tolerances as stated is what stands in for that best, and as far behind as it does not."""
+    """Effects sought once more, where the likeliest explanation, but for offsets of the drawing, has tolerances wider than stated,
+    as `none` has: what was found beside tolerances as stated is what stands in for the drawing best, and as far behind as it does not."""
     tried, pairs = _together(model, none, fit_singles(model, none, every, lambda done: None, workers), every, workers)
     found = better([*tried.singles, *pairs])
     found = better([*found, *rivals_beside(model, found, tried, workers)])
     finalists = _finalists(found)
-    ended = _ended(model, max((h.evidence.ln for h in found), default=-np.inf), finalists, workers)
+    return tried, _with_anew(found, finalists, _ended(model, max((h.evidence.ln for h in found), default=-np.inf), finalists, workers))
+
+
+def _with_anew(found: Sequence[Hypothesis], finalists: Sequence[Hypothesis], ended: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """All that was found, the finalists as they `ended`."""
     anew = dict(zip(map(id, finalists), ended, strict=True))
-    return tried, [anew.get(id(h), h) for h in found]
+    return [anew.get(id(h), h) for h in found]
 
 
 def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:
