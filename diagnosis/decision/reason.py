@@ -9,7 +9,7 @@ from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, 
 from thermospindle.diagnosis.decision.loss import NEGLIGIBLE, in_all
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, SAME, STRAIN, Hypothesis
-from thermospindle.diagnosis.inference.prior import tolerances_of
+from thermospindle.diagnosis.inference.prior import wider_tolerances
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
 from thermospindle.diagnosis.inference.resonance import moving, shown
 from thermospindle.diagnosis.inference.search import Search
@@ -141,15 +141,16 @@ def _moves(model: CampaignModel, r: Resonance) -> str:
 def of_tolerances(model: CampaignModel, best: Hypothesis, explained: bool = True) -> str:
     """What of the drawing is off by more than the scene's tolerances, where these are taken wider
     than stated; where the data are not `explained`, that may be something else."""
-    times = tolerances_of(best.evidence.learned)
-    if times == 1.0:
+    times = wider_tolerances(best.evidence.learned)
+    if not times:
         return ""
     build = [(float(m), q) for m, q in zip(best.evidence.mean, model.parameters, strict=False) if q.kind == kinds_of.BUILD]
-    off = [f"{q.name} by {q.at(m):+.0%}" for m, q in sorted(build, key=lambda row: -abs(row[0])) if abs(m) > OFF][:NAMED]
+    off = [f"{q.name} by {q.at(m):+.0%}" for m, q in sorted(build, key=lambda row: -abs(row[0])) if abs(m) > OFF and {q.name, kinds_of.BUILD} & set(times)][:NAMED]
     which = f": {', '.join(off)}" if off else ""
+    as_wide = f", which are taken {times[kinds_of.BUILD]:g} times as wide as stated" if kinds_of.BUILD in times else ""
     if not explained:
-        return f" Beside that, tolerances are taken {times:g} times as wide as stated{which}; they may stand in for what is not explained."
-    return f" The drawing is off by more than its tolerances, which are taken {times:g} times as wide as stated{which}."
+        return f" Beside that, the drawing is off by more than its tolerances{as_wide}{which}; that may stand in for what is not explained."
+    return f" The drawing is off by more than its tolerances{as_wide}{which}."
 
 
 def unbuilt(model: CampaignModel, h: Hypothesis) -> list[tuple[str, float]]:

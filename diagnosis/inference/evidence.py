@@ -6,7 +6,7 @@ About the fit chi2 is a quadratic in all parameters p: c - 2 b p + p A p. For pr
 
 (MacKay, *Neural Computation* 4 (1992) 415, Eq. 2.6). Sizes learned so, each over a short grid: of the model's
 constant and drifting discrepancies in stiffness and damping, of gain drift (these also between its places), of
-build tolerances and of the errors s (at their likeliest: empirical Bayes), and of every mechanism its width
+build tolerances, all or one, and of the errors s (at their likeliest: empirical Bayes), and of every mechanism its width
 and its departure from its law (the mean over the grid). What is quoted is the posterior at the best place.
 """
 
@@ -37,7 +37,7 @@ from thermospindle.diagnosis.inference.gaussian import (
 from thermospindle.diagnosis.inference.prior import Learned, Own, counted_in, mechanism_root, nuisance_root, whitened_covariance
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism
-from thermospindle.diagnosis.parameters.sizes import GRIDS, WIDER, likeliest, ln_odds
+from thermospindle.diagnosis.parameters.sizes import FAR_OFF, GRIDS, WIDER, likeliest, ln_odds
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect
@@ -87,7 +87,7 @@ def evidence(
 ) -> Evidence:
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of
     discrepancies, drift and errors are taken from the best of these, which is quick, and quicker with the nuisances `kept` of
-    each (`integrated`). Build tolerances are as stated, or with `wide` as much wider as is likeliest; with `learning` the sizes
+    each (`integrated`). Build tolerances are as stated, or with `wide` as much wider as is likeliest, all of them or each by itself; with `learning` the sizes
     of these kinds alone are learned, and errors are as stated. What a fit with the data's own errors still owes is not counted."""
     turn = amplitudes_apart(fit)
     by_test, gradient, information = at_one_size(fit), fit.gradient, fit.information
@@ -100,7 +100,7 @@ def evidence(
     kinds = {q.kind for q in model.parameters}
     kinds |= {kinds_of.OF_CONDITIONS} if fit.moved.any() else set()
     kinds |= {kinds_of.ACTION} if fit.moved[1:].any() else set()
-    grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds} | ({kinds_of.BUILD: tuple(WIDER)} if wide else {})  # last: modes may be off instead
+    grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
     grids = grids if learning is None else {kind: GRIDS[kind] for kind in learning if kind in kinds}
     own_grids = [own_grid(m) for m in fit.mechanisms]
     conditions = tuple(d.condition for d in model.tests)
@@ -129,7 +129,8 @@ def evidence(
         values, s, sizes, nuisances = max(every, key=lambda row: np.logaddexp.reduce(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 or learning is not None else [float(s) for s in _error_scales(whole, fit.count)]
-        values, s, sizes = likeliest(each, grids, scales)
+        drawings = _drawings(model) if wide else [{}]  # last in their grids: modes may be off instead
+        values, s, sizes = max((likeliest(each, grids | own, scales) for own in drawings), key=lambda row: np.logaddexp.reduce(row[0]))
     best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
     own = [tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)]
     learned = Learned(sizes, s, *(tuple(of) for of in zip(*own, strict=True)))
@@ -158,6 +159,13 @@ def evidence(
     by_departing = logsumexp(values) - logsumexp(values[lawful]) + logsumexp(odds[lawful])
     told = np.array(means).reshape(len(means), tests), _stacked(covariances, tests), _stacked(as_shaped, tests)
     return Evidence(float(logsumexp(values)) + truncation - owed, learned, mean, spread, *told, chi2, as_fitted, by_departing)
+
+
+def _drawings(model: CampaignModel) -> list[dict[str, tuple[float, ...]]]:
+    """Places of the widths that build tolerances may have: all of them, or each by itself."""
+    together, each = (kinds_of.BUILD,), tuple(model.numbers.tolerances)
+    as_stated = dict.fromkeys((*together, *each), (1.0,))
+    return [as_stated | dict.fromkeys(together, tuple(WIDER)), as_stated | dict.fromkeys(each, tuple(FAR_OFF))]
 
 
 def _stacked(covariances: Sequence[Array], tests: int) -> Array:

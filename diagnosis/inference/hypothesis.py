@@ -12,7 +12,7 @@ from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit, rated
 from thermospindle.diagnosis.inference.gaussian import apart_by
-from thermospindle.diagnosis.inference.prior import Learned, steady, tolerances_of
+from thermospindle.diagnosis.inference.prior import Learned, steady, wider_tolerances
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, shared
@@ -121,7 +121,7 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
     where it did not reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled. Not
     beside a drawing that is off, to which enlarged errors would lead back."""
     mechanisms, starts = task.mechanisms, task.starts
-    prior, wide = steady(expected, mechanisms), tolerances_of(expected) > 1.0
+    prior, wide = steady(expected, mechanisms), bool(wider_tolerances(expected))
     try:
         if afresh:
             before = TEMPERS[1 : TEMPERS.index(tempers[0])]
@@ -186,8 +186,7 @@ def settled(model: CampaignModel, h: Hypothesis, best: float = -np.inf) -> Hypot
 
 def offsets_of_drawing(model: CampaignModel, h: Hypothesis) -> frozenset[str]:
     """Of an explanation the free forms that say no more than that the drawing is off: of what has a build tolerance, by as much in every test."""
-    tolerances = {q.name for q in model.parameters if q.kind == kinds_of.BUILD}
-    return frozenset(m.name for m in h.mechanisms if m.free and m.name in tolerances and h.same_in_all)
+    return frozenset(m.name for m in h.mechanisms if m.free and m.name in model.numbers.tolerances and h.same_in_all)
 
 
 def widened(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Hypothesis:
@@ -196,6 +195,6 @@ def widened(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Hypo
     if kinds_of.BUILD in h.evidence.learned.sizes:  # of an explanation that was sought with them
         return h
     wide = evidence(model, h.fit, wide=True)
-    if wide.learned.sizes[kinds_of.BUILD] == 1.0 or wide.ln < least:
+    if not wider_tolerances(wide.learned) or wide.ln < least:
         return h
     return max(h, settled(model, Hypothesis(h.fit, wide)), key=lambda h: h.evidence.ln)

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from thermospindle.diagnosis.parameters.sizes import of_tolerances
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
@@ -45,8 +46,8 @@ NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a p
 
 @dataclass(frozen=True)
 class Learned:
-    """What is likeliest: `sizes` of discrepancies, of gain drift and of build tolerances by kind of nuisance,
-    the factor of the stated errors; width, departure and offset of every mechanism (`size_covariance`)."""
+    """What is likeliest: `sizes` of discrepancies, of gain drift and of build tolerances by kind of nuisance, and of single build tolerances
+    by name (`parameters.sizes`); the factor of the stated errors; width, departure and offset of every mechanism (`size_covariance`)."""
 
     sizes: Mapping[str, float]
     errors: float
@@ -71,12 +72,12 @@ def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
     drift, bearings change otherwise and thermal motions are off, is left as it is on paper, so that none takes what the mechanisms should explain."""
     on_paper = (*CHANGING, kinds_of.EXPANSION)
     sizes = {kind: REFERENCE[kind] if kind in on_paper else max(REFERENCE[kind], size) for kind, size in learned.sizes.items() if kind in REFERENCE}
-    return as_stated(sizes, mechanisms)
+    return as_stated(sizes | of_tolerances(learned.sizes), mechanisms)
 
 
-def tolerances_of(learned: Learned) -> float:
-    """How many times as wide as stated build tolerances were learned to be."""
-    return learned.sizes.get(kinds_of.BUILD, 1.0)
+def wider_tolerances(learned: Learned) -> dict[str, float]:
+    """How many times as wide as stated build tolerances were learned to be that are wider: all of them, by their kind, and each by its name."""
+    return {of: times for of, times in of_tolerances(learned.sizes).items() if times > 1.0}
 
 
 def undrifted(learned: Learned) -> Learned:
@@ -111,6 +112,8 @@ def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Arra
     found = np.ones(len(model.parameters))
     for kind, own in model.numbers.of_kind.items():
         found[own] = _width(kind, sizes) ** 2
+    for name, number in model.numbers.tolerances.items():
+        found[number] *= sizes.get(name, 1.0) ** 2
     return found
 
 

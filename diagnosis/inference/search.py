@@ -26,7 +26,7 @@ from thermospindle.diagnosis.inference.hypothesis import (
     widened,
 )
 from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, rivals_beside, without_one
-from thermospindle.diagnosis.inference.prior import tolerances_of
+from thermospindle.diagnosis.inference.prior import wider_tolerances
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import beside, with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
@@ -113,7 +113,7 @@ def search(
     none = _without_what_does_nothing(model, none, at_the_end)
     ranked = _with_anew(found, finalists, at_the_end)
     best = max((h for h in (none, *ranked) if not offsets_of_drawing(model, h)), key=lambda h: h.evidence.ln)
-    if all(tolerances_of(h.evidence.learned) > 1.0 for h in (none, best)):
+    if all(wider_tolerances(h.evidence.learned) for h in (none, best)):
         tried, beside_them = _beside_wider_tolerances(model, none, every, workers)
         ranked = better([*at_the_end, *beside_them])
     ranked += _other_ways(model, [none, *ranked], every, tried, workers)
@@ -175,8 +175,7 @@ def _at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:
 def _settled_at_the_end(model: CampaignModel, best: float, h: Hypothesis) -> Hypothesis:
     if h.mechanisms:  # without any it is settled
         h = settled(model, h, best)
-        drawn = tolerances_of(h.evidence.learned) == 1.0
-        if drawn and not h.free and any(m.shape for m in h.mechanisms) and farthest_tolerance(model, h.fit.point) > STRAINED:
+        if not wider_tolerances(h.evidence.learned) and not h.free and any(m.shape for m in h.mechanisms) and farthest_tolerance(model, h.fit.point, {}) > STRAINED:
             h = _from_the_drawing(model, h)
     return widened(model, h, best - FAR)
 

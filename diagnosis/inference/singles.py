@@ -9,7 +9,7 @@ evidence there and nothing before). What falls behind there is not fitted furthe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, zip_longest
@@ -22,7 +22,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.freeform import as_told_by
 from thermospindle.diagnosis.inference.hypothesis import EARLY, LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, scan
-from thermospindle.diagnosis.inference.prior import CHANGING, Learned, steady, tolerances_of, undrifted
+from thermospindle.diagnosis.inference.prior import CHANGING, Learned, nuisance_variances, steady, undrifted, wider_tolerances
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import with_more
 from thermospindle.diagnosis.inference.screening import Screened, screen
@@ -59,7 +59,7 @@ def fit_singles(
     model: CampaignModel, none: Hypothesis, mechanisms: Sequence[Mechanism], progress: Callable[[str], None], workers: int | None
 ) -> Singles:
     learned = none.evidence.learned
-    misfit, drawn = strained(none), tolerances_of(learned) == 1.0
+    misfit, drawn = strained(none), not wider_tolerances(learned)
     expected = steady(learned)
     about, temper, far = none.fit, 1.0, False
     if misfit:
@@ -180,10 +180,11 @@ def lasting(
     screening sees nothing; from where the model is, if its tolerances are wider than stated. Followed to
     the end is what gains something while errors are still enlarged, and keeps up with the best."""
     n = len(model.parameters)
-    wider = tolerances_of(lead.evidence.learned)
-    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean) < STRAINED * wider:
+    learned = lead.evidence.learned
+    if learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean, learned.sizes) < STRAINED:
         return []
-    own, tempers = (as_drawn(model, lead.fit.point), TEMPERS[:-1]) if wider == 1.0 else (lead.fit.point, TEMPERS[-2:-1])
+    wide = bool(wider_tolerances(learned))
+    own, tempers = (lead.fit.point, TEMPERS[-2:-1]) if wide else (as_drawn(model, lead.fit.point), TEMPERS[:-1])
     drawn = {m.name: m for m in reversed(mechanisms) if m.lasting and m.kind == "law" and m.name not in lead.names}
     tasks = [
         Task((*lead.mechanisms, m), tuple(np.concatenate([own, at[n:]]) for at in scan(model, (m,))[1:]), -np.inf) for m in drawn.values()
@@ -192,15 +193,16 @@ def lasting(
         return []
     about = fit(model, lead.mechanisms, (own, lead.fit.point), tempers=tempers, learned=steady(expected, lead.mechanisms))
     early = fitted(model, tasks, tempers, about, most, expected, workers)
-    least = max([evidence(model, about, wide=wider > 1.0).ln + LITTLE, *(h.evidence.ln - BEHIND for h in early)])
+    least = max([evidence(model, about, wide=wide).ln + LITTLE, *(h.evidence.ln - BEHIND for h in early)])
     tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if h.evidence.ln > least]
     return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers, beaten=lead.fit.cost)
 
 
-def farthest_tolerance(model: CampaignModel, point: Array) -> float:
-    """How far, in its standard deviations, the build tolerance is that is farthest off in a
+def farthest_tolerance(model: CampaignModel, point: Array, sizes: Mapping[str, float]) -> float:
+    """How far, in its standard deviations as learned, the build tolerance is that is farthest off in a
     parameter vector (n,); nothing where there are none."""
-    return max((abs(float(v)) for q, v in zip(model.parameters, point, strict=False) if q.kind == kinds_of.BUILD), default=0.0)
+    own = list(model.numbers.tolerances.values())
+    return float(np.max(np.abs(point[own]) / np.sqrt(nuisance_variances(model, sizes)[own]), initial=0.0))
 
 
 def better(found: Sequence[Hypothesis]) -> list[Hypothesis]:

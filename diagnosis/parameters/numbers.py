@@ -33,6 +33,11 @@ class Numbers:
         return {kind: np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)}
 
     @cached_property
+    def tolerances(self) -> dict[str, int]:
+        """The number of every build tolerance, by its name."""
+        return {p.name: n for n, p in enumerate(self.parameters) if p.kind == kinds_of.BUILD}
+
+    @cached_property
     def sd(self) -> Array:
         """Prior standard deviations (P,) of the parameters in their own units."""
         return np.array([p.sd for p in self.parameters])

@@ -1,13 +1,14 @@
 """Sizes of what a fit moves beside effects, where these are to be learned: places of a grid, their prior odds, and the likeliest of them.
 
-Every size is that of one kind of nuisance (`nuisance`): of the model's constant and drifting
-discrepancies, of gain drift, of thermal motions.
+Every size is that of one kind of nuisance (`nuisance`), of the model's constant and drifting discrepancies, of
+gain drift, of thermal motions; or by its name of one build tolerance: how many times as wide as stated it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise, product
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,7 +31,10 @@ GRIDS = {
 }
 WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
 """Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less
-than those of any two effects: one tolerance that is strained tells of an effect, several of a drawing that is off."""
+than those of any two effects."""
+FAR_OFF = {1.0: 0.0, 4.0: -12.0, 16.0: -13.0}
+"""Prior odds (ln) of the same of one build tolerance by itself, likewise assumed: a joint that nobody has measured is off by tens of
+per cent, and all others are as stated. An effect that does the same is likelier."""
 FARTHER = {1.0: 0.0, 3.0: -2.0, 6.0: -4.0}
 """Prior odds (ln) that thermal motions are off by so many times what two finite-element programs differ by,
 assumed: one spindle in eight by a per cent, one in sixty by two, where any one effect is in one of a hundred."""
@@ -42,6 +46,7 @@ OTHERWISE = {0.0: 0.0, 0.01: 0.0, 0.03: -2.0, 0.1: -4.0}
 assumed: one spindle in eight by 3 %, one in sixty by a tenth, which a missing effect may be as well."""
 ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER, kinds_of.HAMMER: UNCALIBRATED, kinds_of.OF_CONDITIONS: OTHERWISE}
 """By kind of nuisance, of sizes of which one is that of the scene or of the model itself."""
+T = TypeVar("T")
 BETWEEN = 2  # places between two of a grid that are not nothing
 
 
@@ -59,7 +64,12 @@ SWAPPED = (*kinds_of.DISCREPANCIES, kinds_of.CHANGE)
 
 def ln_odds(sizes: Mapping[str, float]) -> float:
     """Prior odds (ln) of sizes that may be other than the scene's or the model's own."""
-    return sum(of[sizes[kind]] for kind, of in ODDS.items() if kind in sizes)
+    return sum(ODDS[of][size] if of in ODDS else FAR_OFF[size] for of, size in sizes.items() if of not in FINER)
+
+
+def of_tolerances(sizes: Mapping[str, T]) -> dict[str, T]:
+    """Of sizes, or of their grids, those of build tolerances: of all, and of each that may be far off by itself."""
+    return {of: size for of, size in sizes.items() if of not in GRIDS}
 
 
 def likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> tuple[Array, float, dict[str, float]]:
@@ -100,11 +110,9 @@ def likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mappin
 
 def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
     """Steps: one size; and build tolerances that are wider, without discrepancies."""
+    as_drawn = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
     found = [{kind: size} for kind, grid in grids.items() for size in grid]
-    if kinds_of.BUILD in grids:
-        as_drawn = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
-        found += [{**as_drawn, kinds_of.BUILD: times} for times in grids[kinds_of.BUILD]]
-    return found
+    return found + [{**as_drawn, of: times} for of, grid in of_tolerances(grids).items() for times in grid]
 
 
 def _swaps(grids: Mapping[str, Sequence[float]], sizes: Mapping[str, float]) -> list[dict[str, float]]:

@@ -39,7 +39,7 @@ from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
-from thermospindle.diagnosis.inference.prior import steady, tolerances_of
+from thermospindle.diagnosis.inference.prior import steady, wider_tolerances
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.remainder import overlap
 from thermospindle.diagnosis.inference.search import search
@@ -201,7 +201,7 @@ def drafted(found: Diagnosis, told: dict[str, Any], plain: Campaign) -> list[flo
         problem = Problem(model, (m,))
         starts = [problem.start({0: m.size.typical}), problem.start({})]
         own = fit(model, (m,), starts, tempers=TEMPERS[1:], learned=prior)
-        fits.append(settled(model, Hypothesis(own, evidence(model, own, wide=tolerances_of(prior) > 1.0))))
+        fits.append(settled(model, Hypothesis(own, evidence(model, own, wide=bool(wider_tolerances(prior))))))
     best = max(fits, key=lambda h: h.evidence.ln)
     least = search(campaign_data(found.spindle, plain), [], [])
     return [left_out(m, h.fit, h.evidence, groups)[0] for m, h in ((model, base), (model, best), (least.model, least.base))]

@@ -14,6 +14,7 @@ from thermospindle.diagnosis.decision.loss import NAMING
 from thermospindle.diagnosis.decision.reason import conventions
 from thermospindle.diagnosis.inference.evidence import Evidence, left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.inference.prior import wider_tolerances
 from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, one_size
@@ -104,12 +105,14 @@ def _sd(evidence: Evidence) -> Array:
     return np.sqrt(np.maximum(np.diag(evidence.covariance), 0.0))
 
 
-def _learned(evidence: Evidence) -> dict[str, float]:
+def _learned(evidence: Evidence) -> dict[str, Any]:
     """Sizes of the model's own constant discrepancy (relative, of frequencies and damping), of gain drift, and the factor on stated errors."""
     s = evidence.learned
+    wider = wider_tolerances(s)
     return {
         **{LEARNED[kind]: size for kind, size in s.sizes.items() if kind in LEARNED},
-        "build_tolerances_times": s.sizes.get(kinds_of.BUILD, 1.0),
+        "build_tolerances_times": max(wider.values(), default=1.0),
+        "wider_by_themselves": {name: times for name, times in wider.items() if name != kinds_of.BUILD},
         "hammer_gains_times": s.sizes.get(kinds_of.HAMMER, 1.0),
         "thermal_motions_times": s.sizes.get(kinds_of.EXPANSION, 1.0),
         "errors_times": s.errors,

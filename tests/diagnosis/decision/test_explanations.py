@@ -15,6 +15,7 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import Overlap
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.parameters.nuisance import BUILD, Nuisance
+from thermospindle.diagnosis.parameters.numbers import Numbers
 
 
 @pytest.fixture
@@ -334,7 +335,8 @@ def test_what_has_a_tolerance_and_is_as_far_off_in_every_test_is_the_drawing(nam
     found = made({name: 16.0})
     lead = found.hypotheses[0]
     h = replace(lead, evidence=replace(lead.evidence, sizes=np.array([sizes]), size_covariance=np.array([np.eye(2)])))
-    model = SimpleNamespace(**vars(found.model) | {"parameters": (Nuisance(BUILD, "~flange", 0.02),)})
+    parameters = (Nuisance(BUILD, "~flange", 0.02),)
+    model = SimpleNamespace(**vars(found.model) | {"parameters": parameters, "numbers": Numbers(parameters, found.model.tests, None)})
     _, (free,), none = explanations(replace(found, model=model, hypotheses=(h, found.base)), Overlap(1.0, 0.0, 1.0))
     assert (none == pytest.approx(1.0)) == off
     assert (free.probability == 0.0) == off

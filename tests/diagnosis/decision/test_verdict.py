@@ -245,14 +245,15 @@ def test_a_drawing_that_is_off_is_said():
     lead = found.hypotheses[0]
     mean = np.array([0.5, -6.0, 2.5, -52.5, *lead.evidence.mean])
 
-    def told(times: float) -> str:
-        learned = replace(lead.evidence.learned, sizes={BUILD: times})
+    def told(times: float, **parts: float) -> str:
+        learned = replace(lead.evidence.learned, sizes={BUILD: times, **parts})
         h = replace(lead, evidence=replace(lead.evidence, learned=learned, mean=mean))
         model = SimpleNamespace(**vars(found.model) | {"parameters": parameters})
         return reason.of_tolerances(model, h)
 
     assert told(1.0) == ""
     assert told(4.0) == " The drawing is off by more than its tolerances, which are taken 4 times as wide as stated: hub by -90%, preload by -12%, mount by +5%."
+    assert told(1.0, preload=16.0, mount=1.0) == " The drawing is off by more than its tolerances: preload by -12%."
 
 
 def test_thermal_motions_that_are_off_are_said():

@@ -15,7 +15,7 @@ from thermospindle.diagnosis.parameters.nuisance import (
     STIFFNESS,
     STIFFNESS_DRIFT,
 )
-from thermospindle.diagnosis.parameters.sizes import FARTHER, WIDER, finer
+from thermospindle.diagnosis.parameters.sizes import FAR_OFF, FARTHER, WIDER, finer
 
 
 @pytest.mark.parametrize(("size", "within"), [(0.0, 1.0), (1e-4, 1.6), (3e-4, 1.6), (5.5e-4, 2.0), (1e-3, 1.6), (1.7e-3, 2.0), (3e-3, 1.6), (1e-2, 1.6)])
@@ -50,21 +50,33 @@ def test_errors_larger_than_stated_are_learned():
 
 def test_tolerances_that_are_wider_stay_so_where_effects_are_sought_beside_them():
     """What drifts, or thermal motions that are off, does not: it may be the effect."""
-    beside = steady(Learned({BUILD: 4.0, EXPANSION: 3.0, STIFFNESS_DRIFT: 1e-3, STIFFNESS: 1e-2}, 1.3)).sizes
-    assert beside == {BUILD: 4.0, EXPANSION: REFERENCE[EXPANSION], STIFFNESS_DRIFT: REFERENCE[STIFFNESS_DRIFT], STIFFNESS: 1e-2}
+    beside = steady(Learned({BUILD: 4.0, "hub mass": 16.0, EXPANSION: 3.0, STIFFNESS_DRIFT: 1e-3, STIFFNESS: 1e-2}, 1.3)).sizes
+    assert beside == {BUILD: 4.0, "hub mass": 16.0, EXPANSION: REFERENCE[EXPANSION], STIFFNESS_DRIFT: REFERENCE[STIFFNESS_DRIFT], STIFFNESS: 1e-2}
 
 
-@pytest.mark.parametrize(("build", "times"), [(1.0, {1.0}), (10.0, {4.0, 8.0})])
-def test_tolerances_wider_than_stated_are_learned(build, times):
-    """And cost their prior odds beside the integral with as wide a prior."""
+@pytest.mark.parametrize(
+    ("build", "every", "of_one"),
+    [((1.0,) * 10, {1.0}, {1.0}), ((10.0,) * 10, {4.0, 8.0}, {1.0}), ((40.0, *(1.0,) * 9), {1.0}, {1.0, 4.0, 16.0})],
+    ids=["as stated", "all of them", "one by itself"],
+)
+def test_tolerances_wider_than_stated_are_learned(build, every, of_one):
+    """All of them or those that are, which cost their prior odds beside the integral with as wide a prior."""
+    found_wide = 0
     for seed in range(5):
         made = toy(seed, 0.0, rows=200, build=build)
         found = evidence(made.model, made.fit, wide=True)
-        assert found.learned.sizes[BUILD] in times
-        prior = made.prior(*(found.learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)))
+        sizes = found.learned.sizes
+        assert sizes[BUILD] in every
+        assert sizes["b0"] in of_one
+        assert all(sizes[f"b{k}"] == 1.0 for k in range(1, 10))
+        assert (sizes["b0"] > 1.0) == (max(of_one) > 1.0 and abs(float(found.mean[0])) > 6.0)
+        found_wide += sizes["b0"] > 1.0
+        prior = made.prior(*(sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)))
         own = [q.kind == BUILD for q in made.model.parameters]
-        prior[own, own] *= found.learned.sizes[BUILD] ** 2
-        assert found.ln == pytest.approx(made.ln(prior, found.learned.errors) + WIDER[found.learned.sizes[BUILD]], abs=1e-6)
+        prior[own, own] *= sizes[BUILD] ** 2
+        prior[0, 0] *= sizes["b0"] ** 2
+        assert found.ln == pytest.approx(made.ln(prior, found.learned.errors) + WIDER[sizes[BUILD]] + FAR_OFF[sizes["b0"]], abs=1e-6)
+    assert found_wide >= 3 * (max(of_one) > 1.0)
 
 
 @pytest.mark.parametrize(("off", "times"), [(1.0, {1.0}), (12.0, {3.0, 6.0})])

@@ -66,15 +66,16 @@ def toy(
     rows: int = 40,
     errors: float = 1.0,
     confused: tuple[float, ...] = (0.0, 0.0, 0.0),
-    build: float = 1.0,
+    build: float | tuple[float, ...] = 1.0,
     drawing: str = BUILD,
     reference: Condition | None = None,
 ) -> Toy:
     """Data drawn with a discrepancy of the size `stiffness`, build tolerances (or other nuisances of that kind, the `drawing`)
-    `build` times those stated, and, with a mechanism in the fit, a `hidden` size in every test, of which the first tolerance
+    `build` times those stated, three or as many as are told, and, with a mechanism in the fit, a `hidden` size in every test, of which the first tolerance
     cannot be told from `confused` times its change; with a `reference` its law is the data's own and grows from there."""
     random = np.random.default_rng(seed)
-    parameters = [Nuisance(drawing, f"b{i}", 0.01) for i in range(3)] + [
+    times = dict(enumerate(np.broadcast_to(build, 3) if isinstance(build, float) else build))
+    parameters = [Nuisance(drawing, f"b{i}", 0.01) for i in times] + [
         Nuisance(STIFFNESS, f"k{i}", STIFFNESS_SD, modes=(i, i)) for i in range(8)
     ]
     parameters += [Nuisance(DAMPING, f"c{i}", DAMPING_SD, modes=(i, i)) for i in range(2)]
@@ -88,8 +89,8 @@ def toy(
         offset = 1.0 if reference is None else 0.0
         roots = (np.linalg.cholesky(size_covariance(CONDITIONS, REFERENCE_WIDTH * size.prior_sd, REFERENCE_DEPARTURE, offset, reference)),)
     n = len(parameters)
-    sizes = {STIFFNESS: stiffness / STIFFNESS_SD, drawing: build, TEMPERATURE: 1.0}
-    p = np.array([sizes.get(q.kind, 0.0) for q in parameters])
+    sizes = {STIFFNESS: stiffness / STIFFNESS_SD, TEMPERATURE: 1.0}
+    p = np.array([*times.values(), *(sizes.get(q.kind, 0.0) for q in parameters[len(times) :])])
     p = np.concatenate([p * random.standard_normal(n), *([np.linalg.solve(r, np.full(3, np.array(hidden) - 1.0)) for r in roots])])
     own_of_test = np.array([q.test is None for q in parameters])
     jacobians, y = [], []
