@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache, reduce
+from functools import cache, lru_cache, partial, reduce
 from itertools import zip_longest
 
 import numpy as np
@@ -37,7 +37,7 @@ from thermospindle.diagnosis.inference.gaussian import (
 from thermospindle.diagnosis.inference.prior import Learned, Own, counted_in, mechanism_root, nuisance_root, whitened_covariance
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism
-from thermospindle.diagnosis.parameters.sizes import FAR_OFF, GRIDS, WIDER, likeliest, ln_odds
+from thermospindle.diagnosis.parameters.sizes import GRIDS, likeliest, ln_odds, with_wider_tolerances
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect
@@ -123,17 +123,30 @@ def evidence(
         nuisances = nuisances or beside(s, sizes)
         return marginal(scaled(s), nuisances).integrated(roots) + odds - fit.count * np.log(s) + ln_odds(sizes)
 
+    def at_best(values: Array, sizes: Mapping[str, float], s: float) -> Learned:
+        """What was learned, with mechanisms as wide as is likeliest."""
+        best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
+        return Learned(sizes, s, *(tuple(of) for of in zip(*[tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)], strict=True)))
+
+    def told_of(numbers: Sequence[int], s: float, sizes: Mapping[str, float]) -> tuple[Array, Array]:
+        """Posterior mean and variance of some nuisances beside sizes learned."""
+        nuisances = beside(s, sizes)
+        mean, spread, _ = posterior(scaled(s), nuisances, mechanism_root(model, fit.mechanisms, at_best(each(s, sizes, nuisances), sizes, s)))
+        return mean[numbers], np.diag(spread)[numbers]
+
     nuisances = None
     if near:
         every = [(each(n.errors, n.sizes, own), n.errors, dict(n.sizes), own) for n, own in zip_longest(near, kept)]
         values, s, sizes, nuisances = max(every, key=lambda row: np.logaddexp.reduce(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 or learning is not None else [float(s) for s in _error_scales(whole, fit.count)]
-        drawings = _drawings(model) if wide else [{}]  # last in their grids: modes may be off instead
-        values, s, sizes = max((likeliest(each, grids | own, scales) for own in drawings), key=lambda row: np.logaddexp.reduce(row[0]))
-    best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
-    own = [tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)]
-    learned = Learned(sizes, s, *(tuple(of) for of in zip(*own, strict=True)))
+        if wide:
+            tolerances = model.numbers.tolerances
+            values, s, sizes = with_wider_tolerances(each, grids, scales, tuple(tolerances), partial(told_of, list(tolerances.values())))
+        else:
+            values, s, sizes = likeliest(each, grids, scales)
+    learned = at_best(values, sizes, s)
+    own = learned.own
     nuisances = nuisances or beside(s, sizes)
     mean, spread, left = posterior(scaled(s), nuisances, mechanism_root(model, fit.mechanisms, learned))
     chi2 = whole.at(mean)
@@ -159,13 +172,6 @@ def evidence(
     by_departing = logsumexp(values) - logsumexp(values[lawful]) + logsumexp(odds[lawful])
     told = np.array(means).reshape(len(means), tests), _stacked(covariances, tests), _stacked(as_shaped, tests)
     return Evidence(float(logsumexp(values)) + truncation - owed, learned, mean, spread, *told, chi2, as_fitted, by_departing)
-
-
-def _drawings(model: CampaignModel) -> list[dict[str, tuple[float, ...]]]:
-    """Places of the widths that build tolerances may have: all of them, or each by itself."""
-    together, each = (kinds_of.BUILD,), tuple(model.numbers.tolerances)
-    as_stated = dict.fromkeys((*together, *each), (1.0,))
-    return [as_stated | dict.fromkeys(together, tuple(WIDER)), as_stated | dict.fromkeys(each, tuple(FAR_OFF))]
 
 
 def _stacked(covariances: Sequence[Array], tests: int) -> Array:

@@ -46,7 +46,10 @@ OTHERWISE = {0.0: 0.0, 0.01: 0.0, 0.03: -2.0, 0.1: -4.0}
 assumed: one spindle in eight by 3 %, one in sixty by a tenth, which a missing effect may be as well."""
 ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER, kinds_of.HAMMER: UNCALIBRATED, kinds_of.OF_CONDITIONS: OTHERWISE}
 """By kind of nuisance, of sizes of which one is that of the scene or of the model itself."""
+UNTOLD = 1e-6  # of its prior's variance, by which data tell something of a tolerance
 T = TypeVar("T")
+Each = Callable[[float, Mapping[str, float]], Array]
+Found = tuple[Array, float, dict[str, float]]
 BETWEEN = 2  # places between two of a grid that are not nothing
 
 
@@ -72,7 +75,47 @@ def of_tolerances(sizes: Mapping[str, T]) -> dict[str, T]:
     return {of: size for of, size in sizes.items() if of not in GRIDS}
 
 
-def likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> tuple[Array, float, dict[str, float]]:
+def with_wider_tolerances(each: Each, grids: Mapping[str, Sequence[float]], scales: Sequence[float], tolerances: Sequence[str], told: Callable[[float, Mapping[str, float]], tuple[Array, Array]]) -> Found:
+    """`likeliest`, with build `tolerances` as stated, all of them wider, or some far off by themselves, whichever is likeliest.
+
+    One by one those that promise most are wider, beside the discrepancies that were learned or none, by the posterior mean and
+    variance of each that are `told` beside some sizes: all of them could be tried at every step, but a flexible shaft has sixty.
+    """
+    as_stated = dict.fromkeys((kinds_of.BUILD, *tolerances), (1.0,))
+    together = likeliest(each, {**grids, **as_stated, kinds_of.BUILD: tuple(WIDER)}, scales)
+    found = together if together[2][kinds_of.BUILD] == 1.0 else likeliest(each, {**grids, **as_stated}, scales)
+    nothing = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
+    while True:
+        _, s, sizes = found
+        far = {of: (size,) for of, size in of_tolerances(sizes).items()}
+        steps = {_farthest(*told(s, beside), sizes, tolerances) for beside in (sizes, {**sizes, **nothing})}
+        tried = [likeliest(each, {**grids, **far, name: (times,)}, scales) for name, times, gain in sorted(steps) if gain > 0]
+        best = max([found, *tried], key=_whole)
+        if best is found:
+            return max(found, together, key=_whole)
+        found = best
+
+
+def _whole(found: Found) -> float:
+    return float(np.logaddexp.reduce(found[0]))
+
+
+def _farthest(mean: Array, variance: Array, sizes: Mapping[str, float], tolerances: Sequence[str]) -> tuple[str, float, float]:
+    """The build tolerance that by another width of its own gains most ln evidence, that width, and what it gains; by the posterior
+    `mean` and `variance` (n,) of each, which tell the likelihood of each by itself (Gaussian conditioning, backwards)."""
+    best = "", 1.0, 0.0
+    for name, m, c in zip(tolerances, mean, variance, strict=True):
+        prior = sizes[name] ** 2
+        if c < (1 - UNTOLD) * prior:
+            own = c * prior / (prior - c)  # variance of the data's own estimate, which is own / c times the mean
+            for times, odds in FAR_OFF.items():
+                whole, as_is = own + times**2, own + prior
+                gain = odds - FAR_OFF[sizes[name]] + 0.5 * float((m * own / c) ** 2 * (1 / as_is - 1 / whole) - np.log(whole / as_is))
+                best = max(best, (name, times, gain), key=lambda row: row[2])
+    return best
+
+
+def likeliest(each: Each, grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> Found:
     """The ln evidence that `each` gives, the errors of `scales` and the sizes of discrepancies of
     `grids`, and between their places, that have most of it: by the step that gains most, until none does.
 
@@ -110,9 +153,11 @@ def likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mappin
 
 def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
     """Steps: one size; and build tolerances that are wider, without discrepancies."""
-    as_drawn = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
     found = [{kind: size} for kind, grid in grids.items() for size in grid]
-    return found + [{**as_drawn, of: times} for of, grid in of_tolerances(grids).items() for times in grid]
+    if kinds_of.BUILD in grids:
+        as_drawn = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
+        found += [{**as_drawn, kinds_of.BUILD: times} for times in grids[kinds_of.BUILD]]
+    return found
 
 
 def _swaps(grids: Mapping[str, Sequence[float]], sizes: Mapping[str, float]) -> list[dict[str, float]]:
