@@ -12,7 +12,7 @@ from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit, rated
 from thermospindle.diagnosis.inference.gaussian import apart_by
-from thermospindle.diagnosis.inference.prior import Learned, steady, wider_tolerances
+from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady, wider_tolerances
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, shared
@@ -59,6 +59,11 @@ class Hypothesis:
     @property
     def free(self) -> bool:
         return any(m.free for m in self.mechanisms)
+
+    @property
+    def widens(self) -> bool:
+        """Whether build tolerances that are wider than stated are weighed in its evidence."""
+        return kinds_of.BUILD in self.evidence.learned.sizes
 
     @property
     def idle(self) -> tuple[bool, ...]:
@@ -159,7 +164,7 @@ def settled(model: CampaignModel, h: Hypothesis, best: float = -np.inf) -> Hypot
     without what was learned to be nothing. What ends with less evidence than the quadratic promised
     may have stalled on that way, whatever it costs at first, and is fitted from the other start too.
     """
-    wide = kinds_of.BUILD in h.evidence.learned.sizes
+    wide = h.widens
     for _ in range(REFITS):
         refit = partial(fit, model, h.mechanisms, rates=h.fit.rates, tempers=TEMPERS[-1:], learned=h.evidence.learned, moved=h.fit.moved)
         before = h.evidence
@@ -191,10 +196,19 @@ def offsets_of_drawing(model: CampaignModel, h: Hypothesis) -> frozenset[str]:
 
 def widened(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Hypothesis:
     """With build tolerances wider than stated, where that is likelier, and promises the `least` ln evidence that counts:
-    a drawing that is off. Nothing is sought with them at first, for they would take what is missing before anything is found."""
-    if kinds_of.BUILD in h.evidence.learned.sizes:  # of an explanation that was sought with them
+    a drawing that is off."""
+    if h.widens:  # of an explanation that was sought with them
         return h
     wide = evidence(model, h.fit, wide=True)
     if not wider_tolerances(wide.learned) or wide.ln < least:
         return h
     return max(h, settled(model, Hypothesis(h.fit, wide)), key=lambda h: h.evidence.ln)
+
+
+def as_built(model: CampaignModel, none: Hypothesis) -> Hypothesis:
+    """The model without effects with the build tolerances beside which effects are sought: `widened`, where that leaves no more than errors,
+    and no mode that drifts. Else as stated, for tolerances that are wider would take what is missing before anything is found."""
+    wide = widened(model, none)
+    sizes = wide.evidence.learned.sizes
+    explained = wide.evidence.learned.errors <= STRAIN and not any(sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
+    return wide if explained and wide.evidence.ln > none.evidence.ln + PLENTY else none

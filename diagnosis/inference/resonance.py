@@ -56,13 +56,13 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
         tried = in_parallel(partial(_from, wider, h.mechanisms), ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS)), workers)
         best = replace(min(tried, key=lambda f: f.cost), mechanisms=h.mechanisms)
         sd, learned = np.array([q.sd for q in resonance.nuisances]), None
-        if not asked(Hypothesis(best, evidence(wider, best)), 0.0, FAR * clear) or not _resonates(model, resonance.at(sd * best.point[n : n + more])):
+        if not asked(Hypothesis(best, evidence(wider, best, wide=h.widens)), 0.0, FAR * clear) or not _resonates(model, resonance.at(sd * best.point[n : n + more])):
             return None  # smooth over the band, it would stand in for something else
         for _ in range(CENTRED):  # so that all explanations start about it as it is
             resonance, left = _centred(resonance, best.point[n : n + more], moves)
             wider, there = model.with_resonance(resonance), np.concatenate([best.point[:n], left, best.point[n + more :]])
             again = fit(wider, h.mechanisms, there, best.rates, TEMPERS[-1:], learned, best.moved)
-            found = settled(wider, Hypothesis(again, evidence(wider, again)))
+            found = settled(wider, Hypothesis(again, evidence(wider, again, wide=h.widens)))
             best, learned = found.fit, found.evidence.learned
     except FAILED:
         return None

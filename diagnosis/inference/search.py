@@ -19,6 +19,7 @@ from thermospindle.diagnosis.inference.hypothesis import (
     STRAIN,
     Hypothesis,
     Task,
+    as_built,
     as_drawn,
     fitted,
     offsets_of_drawing,
@@ -80,6 +81,7 @@ def search(
     with meanwhile(partial(with_own_laws, named, model.spindle, [d.condition for d in model.tests]), workers) as own_laws:
         model, plain = hit_when_it_was(model, workers)
         model, none = with_resonance(model, plain, workers) or (model, plain)
+        none = as_built(model, none)
         every = [*named, *own_laws(), *free]
     progress("fitted without effects")
     tried = fit_singles(model, none, every, progress, workers)
@@ -90,7 +92,7 @@ def search(
     before = model
     if len(wider.resonances) > len(model.resonances):
         model = wider
-        none = without_effects(model, workers)
+        none = as_built(model, without_effects(model, workers))
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
             tried = fit_singles(model, none, every, lambda done: None, workers)  # steps that were counted already
         else:
@@ -113,7 +115,7 @@ def search(
     none = _without_what_does_nothing(model, none, at_the_end)
     ranked = _with_anew(found, finalists, at_the_end)
     best = max((h for h in (none, *ranked) if not offsets_of_drawing(model, h)), key=lambda h: h.evidence.ln)
-    if all(wider_tolerances(h.evidence.learned) for h in (none, best)):
+    if not wider_tolerances(tried.expected) and all(wider_tolerances(h.evidence.learned) for h in (none, best)):
         tried, beside_them = _beside_wider_tolerances(model, none, every, workers)
         ranked = better([*at_the_end, *beside_them])
     ranked += _other_ways(model, [none, *ranked], every, tried, workers)
